@@ -11,6 +11,7 @@ import json
 import random
 from collections import Counter, defaultdict
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import foreign_world
@@ -168,10 +169,7 @@ def main():
     plan = PlanFile({"world": worlds, "grammar": [options.grammar]}, kind="foreign", batch=1)
     dataset = Dataset.create(options.out, plan)
     run_campaign(
-        dataset,
-        run_world,
-        lambda: open_workers(options.workers),
-        progress=lambda *counts: print(*counts, flush=True),
+        dataset, run_world, partial(open_workers, options.workers), progress=lambda *counts: print(*counts, flush=True)
     )
     rows = dataset.table()
     print(table([json.loads(row["outcome"]) for row in rows.to_pylist() if not row["failure"]]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -18,6 +19,7 @@ from gfimu.cli.campaign_views import (
     table,
 )
 from gfimu.cli.output import JsonOption, print_json, print_paths, progress
+from gfimu.errors import InputError
 
 __all__ = ["register"]
 
@@ -29,6 +31,9 @@ class _Campaigns(TyperGroup):
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         if args and args[0] not in {*self.commands, "--help"}:
+            meant = get_close_matches(args[0], self.commands, 1)
+            if meant and not Path(args[0]).exists():
+                raise InputError(f"{args[0]}: neither a plan nor a command; did you mean gfimu campaign {meant[0]}?")
             args = [self.default, *args]
         return super().parse_args(ctx, args)
 
@@ -40,6 +45,7 @@ def register(app: typer.Typer) -> None:
         help="Run many simulated cases by a plan into one dataset, and summarise it; a second call goes on where one "
         "ended.\n\nExample: gfimu campaign plan.toml --out campaign\n\nThe word run may be left out.",
         no_args_is_help=True,
+        subcommand_metavar="PLAN --out DIR | COMMAND [ARGS]...",
     )
     group.command(name="run")(_run)
     group.command(name="status")(status)

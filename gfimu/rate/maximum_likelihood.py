@@ -20,6 +20,7 @@ __all__ = ["maximum_likelihood_rate", "rate_of_null_space", "rates_of_null_space
 
 _ITERATIONS = 60
 _CONVERGED = 1e-10
+_LEAST_SEEN = 1e-12  # numerical: determinant of the information, its trace 1, below which a direction is not seen
 # Seven directions, one of which is within 36° of any axis.
 _STARTS = np.array(
     [[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1], [1, 1, -1], [1, -1, 1], [-1, 1, 1]], dtype=float
@@ -76,23 +77,28 @@ def rates_of_null_space(
     # Rows beyond the rank see no product: only the first ones carry information.
     left, strengths, right = np.linalg.svd(sensitivity)
     compact = strengths[:rank, None] * right[:rank]  # (rank, 6)
-    omega, covariance, _ = _solve(z @ left[:, :rank], compact, _STARTS)
+    omega, information = _solve(z @ left[:, :rank], compact, _STARTS)
+    covariance = np.full((len(z), 3, 3), np.nan)
+    covariance[np.isfinite(omega[:, 0])] = np.diag(np.full(3, np.inf))  # but for those that are seen in all directions
+    scale = np.trace(information, axis1=1, axis2=2)
+    seen = np.flatnonzero((scale > 0.0) & np.isfinite(scale))
+    seen = seen[np.linalg.det(information[seen] / scale[seen, None, None]) > _LEAST_SEEN]
+    covariance[seen] = np.linalg.inv(information[seen])
     return omega, covariance
 
 
 def rate_of_null_space(z: NDArray[np.float64], sensitivity: NDArray[np.float64]) -> NDArray[np.float64]:
     """Rate (3,) that fits one sample z (d,) = M s(ω) + white noise best, up to the sign, with M of shape (d, 6)."""
-    omega, _, _ = _solve(z[None], np.ascontiguousarray(sensitivity), _STARTS)
+    omega, _ = _solve(z[None], np.ascontiguousarray(sensitivity), _STARTS)
     return omega[0]
 
 
 @njit(cache=True, error_model="numpy")
 def _solve(z, m, starts):  # type: ignore[no-untyped-def]
-    """Solve each row of z (n, r); returns rates (n, 3), covariances (n, 3, 3) and sums of squares (n,)."""
+    """Solve each row of z (n, r); returns rates (n, 3) and the information on them (n, 3, 3)."""
     n, rows = z.shape
     omega = np.full((n, 3), np.nan)
-    covariance = np.full((n, 3, 3), np.nan)
-    squares = np.full(n, np.nan)
+    information = np.full((n, 3, 3), np.nan)
     strength = np.sqrt((m * m).sum())
     last = np.zeros(3)
     residual = np.empty(rows)
@@ -109,22 +115,12 @@ def _solve(z, m, starts):  # type: ignore[no-untyped-def]
             if other < cost:
                 cost = other
                 best = candidate
-        best, cost = _descend(z[k], m, best, residual, slope)
+        best = _descend(z[k], m, best, residual, slope)
         _residual(z[k], m, best, residual, slope)
-        information = slope.T @ slope
+        information[k] = slope.T @ slope
         omega[k] = best
-        squares[k] = cost
-        scale = np.trace(information)
-        if scale > 0.0 and np.linalg.det(information / scale) > 1e-12:
-            covariance[k] = np.linalg.inv(information)
-        else:
-            covariance[k] = np.diag(np.full(3, np.inf))
-            for a in range(3):
-                for b in range(3):
-                    if a != b:
-                        covariance[k, a, b] = 0.0
         last = best
-    return omega, covariance, squares
+    return omega, information
 
 
 @njit(cache=True, error_model="numpy")
@@ -157,7 +153,7 @@ def _descend(z, m, start, residual, slope):  # type: ignore[no-untyped-def]
             damped = normal.copy()
             for a in range(3):
                 damped[a, a] += damping * normal[a, a] + floor
-            trial = omega + np.linalg.solve(damped, gradient)
+            trial = omega + _solution(damped, gradient)
             other = _residual(z, m, trial, residual, slope)
             if other <= cost:
                 accepted = True
@@ -172,4 +168,22 @@ def _descend(z, m, start, residual, slope):  # type: ignore[no-untyped-def]
         damping = max(damping * 0.2, 1e-12)
         if done:
             break
-    return omega, cost
+    return omega
+
+
+@njit(cache=True, error_model="numpy")
+def _solution(matrix, column):  # type: ignore[no-untyped-def]
+    """Return P⁻¹ c of a positive definite P (3, 3), which is overwritten: loops, as a library's compile far longer."""
+    found = np.empty(3)
+    for i in range(3):
+        found[i] = column[i]
+        for j in range(i):
+            matrix[i, j] /= matrix[j, j]
+            found[i] -= matrix[i, j] * found[j]
+            for q in range(j + 1, i + 1):
+                matrix[i, q] -= matrix[i, j] * matrix[q, j] * matrix[j, j]
+    for i in range(2, -1, -1):
+        found[i] /= matrix[i, i]
+        for q in range(i + 1, 3):
+            found[i] -= matrix[q, i] * found[q]
+    return found

@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 from gfimu.errors import GfimuError, InputError
@@ -49,7 +50,7 @@ def _run(options: argparse.Namespace) -> int:
     run_campaign(
         _PrintedDataset.create(options.out, plan),
         study_work,
-        lambda: open_workers(options.workers, options.cluster),
+        partial(open_workers, options.workers, options.cluster),
     )
     return 0
 

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import pickle
 import time
+import warnings
 from collections.abc import Iterator
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from gfimu.errors import InputError
-from sim.sweep.workers import Workers
+from gfimu.errors import InputError, RecordingWarning
+from sim.sweep.engine import Workers
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -36,11 +38,15 @@ def open_cluster(address: str) -> Iterator[Workers]:
     """
     client = _client(address)
     executor = _ClusterExecutor(client)
+    log = logging.getLogger("distributed.client")
+    level = log.level
+    log.setLevel(logging.CRITICAL)  # a lost connection is one line of the campaign, not a traceback of Dask
     try:
         yield Workers(executor, executor.count, _deaths)
     finally:
         executor.shutdown(wait=False)
         client.close()
+        log.setLevel(level)
 
 
 class _ClusterExecutor(Executor):
@@ -110,13 +116,18 @@ def _client(address: str) -> Client:
         ) from None
     if kind != "Scheduler":
         raise InputError(f"--cluster {address}: is a Dask {kind.lower()}; give the address of the scheduler")
-    return Client(address, timeout=_CONNECT, set_as_default=False)
+    client = Client(address, timeout=_CONNECT, set_as_default=False)
+    if not client.nthreads():
+        text = f"--cluster {address}: has no workers yet, the campaign waits for them; start some with: dask worker"
+        warnings.warn(f"{text} {address}", RecordingWarning, stacklevel=2)
+    return client
 
 
 def _deaths(error: BaseException) -> int | None:
     """Return how many workers died under a batch: Dask itself moves it on before it gives it up."""
     from distributed import KilledWorker
+    from distributed.comm import CommClosedError
 
     if isinstance(error, KilledWorker):
         return int(error.allowed_failures) + 1
-    return 0 if isinstance(error, CancelledError | BrokenExecutor | OSError) else None
+    return 0 if isinstance(error, CancelledError | BrokenExecutor | CommClosedError) else None

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 from collections import Counter, deque
 from collections.abc import Callable, Generator, Iterator, Mapping
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Future, wait
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
 from contextlib import AbstractContextManager, closing
+from dataclasses import dataclass
 from typing import Any
 
 from threadpoolctl import threadpool_limits
@@ -19,12 +20,35 @@ from sim.sweep.design import Case, Design
 from sim.sweep.pace import running
 from sim.sweep.plan import PlanFile
 from sim.sweep.together import prepared
-from sim.sweep.workers import Workers
 
-__all__ = ["Work", "run_campaign"]
+__all__ = ["Work", "Workers", "run_campaign"]
 
 Work = Callable[[Case], Mapping[str, Any]]
 """What a case does: it returns its results by name, with units in the names; a `GfimuError` is a failed case."""
+
+
+@dataclass(frozen=True)
+class Workers:
+    """An executor, and what a campaign must know of the workers behind it.
+
+    An executor that can't go on raises `BrokenExecutor`, from ``count``, ``submit`` or a future; the campaign then
+    opens another one.
+
+    Parameters
+    ----------
+    executor : Executor
+        Runs the batches.
+    count : callable
+        Returns how many batches run at once; of a cluster that may change.
+    deaths : callable
+        Returns how many workers died under a batch, by the error of its future: 0 where it was lost for another
+        reason, None where the error says nothing of workers.
+    """
+
+    executor: Executor
+    count: Callable[[], int]
+    deaths: Callable[[BaseException], int | None]
+
 
 OpenWorkers = Callable[[], AbstractContextManager[Workers]]
 """Opens the workers, which are closed when the campaign ends or the executor breaks."""

@@ -8,8 +8,8 @@ from concurrent.futures import Executor
 from contextlib import AbstractContextManager, contextmanager
 
 from sim.sweep.cluster import open_cluster
+from sim.sweep.engine import Workers
 from sim.sweep.pool import open_pool
-from sim.sweep.workers import Workers
 
 __all__ = ["open_executor", "open_workers", "processors"]
 

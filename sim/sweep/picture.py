@@ -19,7 +19,7 @@ from gfimu.visual.colours import AFTER_ON_PAPER, BEFORE_ON_PAPER, INK, NOISE_ON_
 from sim.sweep.design import Design
 from sim.sweep.plan import RangeTable
 from sim.sweep.sensitivity import Sensitivity, seed_shares, sensitivities
-from sim.sweep.summary import failures, numbers, result_names, varying
+from sim.sweep.summary import failures, numbers, result_names, share_of, varying
 
 mpl.use("Agg")
 
@@ -197,8 +197,10 @@ def _draw_boxes(axes: Axes, groups: list[Floats], *, truth: bool) -> None:
     if truth:
         for place, group in enumerate(groups):
             if len(group):
-                share, error = group.mean(), 1.96 * np.sqrt(max(group.mean() * (1 - group.mean()), 0.0) / len(group))
+                low, share, high = share_of(group)
+                error = [[share - low], [high - share]]
                 axes.errorbar(place, share, error, fmt="o", ms=4, color=css(AFTER_ON_PAPER), capsize=3)
+        axes.set_xlim(-0.5, len(groups) - 0.5)
         axes.set_ylim(-0.03, 1.03)
         return
     axes.boxplot(

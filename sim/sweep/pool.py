@@ -13,7 +13,7 @@ from multiprocessing.connection import Connection
 from multiprocessing.queues import SimpleQueue
 
 from gfimu.errors import GfimuError
-from sim.sweep.workers import Workers
+from sim.sweep.engine import Workers
 
 __all__ = ["open_pool"]
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from gfimu.errors import unknown_name
 from sim.sweep.plan import PlanFile, RangeTable, Value
 
-__all__ = ["Group", "failures", "grouped", "numbers", "result_names", "varying"]
+__all__ = ["Group", "failures", "grouped", "numbers", "result_names", "share_of", "varying"]
 
 _QUANTILES = (0.05, 0.5, 0.95)
 _NO_RESULT = {"case", "seed", "failure"}
@@ -114,7 +114,7 @@ def grouped(table: pa.Table, plan: PlanFile, by: Sequence[str] = ()) -> list[Gro
             column = numbers(table, result)[rows]
             column = column[np.isfinite(column)]
             if len(column):
-                summary = _share if pa.types.is_boolean(table.schema.field(result).type) else _quantiles
+                summary = share_of if pa.types.is_boolean(table.schema.field(result).type) else _quantiles
                 found.append(Group(named, result, len(column), int(failed[rows].sum()), *summary(column)))
     return found
 
@@ -157,7 +157,7 @@ def _quantiles(column: NDArray[np.float64]) -> tuple[float, float, float]:
     return float(low), float(median), float(high)
 
 
-def _share(truths: NDArray[np.float64]) -> tuple[float, float, float]:
+def share_of(truths: NDArray[np.float64]) -> tuple[float, float, float]:
     """Return Wilson's 95 % interval of a share, and the share between its limits."""
     n, share, z = len(truths), float(np.mean(truths)), _Z95
     centre, half = share + z**2 / (2 * n), z * np.sqrt(share * (1 - share) / n + z**2 / (4 * n**2))

@@ -72,6 +72,12 @@ def test_status_sees_a_campaign_that_runs(gfimu_command, part):
     assert (found["runs"], found["left_s"]) == ([], None)
 
 
+def test_a_misspelt_command_is_named(gfimu_command, part):
+    refused = gfimu_command("campaign", "stats", part)
+    assert refused.code == 2
+    assert "did you mean gfimu campaign status?" in refused.stderr
+
+
 def test_a_killed_run_is_no_run(gfimu_command, part):
     ended = subprocess.Popen([sys.executable, "-c", ""])
     ended.wait()

@@ -22,8 +22,8 @@ from sim.study.gate import LONGEST, STRATA, choose_gate, gate_cases
 from sim.study.outcome import draw_world
 from sim.study.outcome_file import generator_name, read_outcomes
 from sim.sweep.dataset import Dataset
+from sim.sweep.engine import Workers
 from sim.sweep.plan import PlanFile
-from sim.sweep.workers import Workers
 
 
 @pytest.fixture(scope="module")

@@ -13,11 +13,10 @@ from sweep_cases import always_dies, dies_once, quick
 from gfimu.errors import InputError
 from sim.sweep.dataset import Dataset
 from sim.sweep.design import Design
-from sim.sweep.engine import run_campaign
+from sim.sweep.engine import Workers, run_campaign
 from sim.sweep.plan import load_plan
 from sim.sweep.pool import open_pool
 from sim.sweep.summary import failures, grouped
-from sim.sweep.workers import Workers
 
 GRID = """
 repeats = 3

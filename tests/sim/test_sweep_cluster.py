@@ -72,6 +72,7 @@ def after(cases, change):
 
 
 def test_a_cluster_gives_the_bytes_of_the_pool_whoever_dies_or_leaves(ran):
+    """Several seconds, as processes start: a pool, a cluster, and a worker in place of each that ends."""
     pool, once, _ = ran("pool", partial(open_pool, 2))
     assert set(once) == {1}
     with cluster() as found:
