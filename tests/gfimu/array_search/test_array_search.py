@@ -7,9 +7,9 @@ from scipy.optimize import approx_fprime
 from gfimu.errors import GeometryError, InputError
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.geometry.dilution import gdop_lower_bound
-from gfimu.geometry.objective import GeometryObjective
+from gfimu.array_search.criteria import TraceCriterion
 from gfimu.geometry.scoring import score
-from gfimu.geometry.search import optimize
+from gfimu.array_search.search import optimize
 
 
 def search(n_chips, seed=1, restarts=12, **options):
