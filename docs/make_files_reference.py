@@ -18,7 +18,7 @@ PAGE = Path(__file__).parent / "files.md"
 INTRODUCTION = """\
 # Files key by key
 <!-- made by make_files_reference.py; edit the schemas that are named below -->
-Arrays, parts, column maps, twins, scenarios, frames, stages and plans are TOML files. `gfimu list arrays` lists those
+Arrays, parts, column maps, twins, scenarios, frames, stages, plans and briefs are TOML files. `gfimu list arrays` lists those
 that come with gfimu, `gfimu show cube12` prints one, and `gfimu new array --out my_array.toml` writes a commented one
 to edit. A key that is not on this page is refused, with the nearest one that is; part files may hold further keys for
 people.

@@ -4,16 +4,18 @@
 
     tr(W M⁻¹) · tr(HWH M) ≥ (tr WH)².                                                                     (1)
 
-M is a sum over n chips, M = Σ A(x_i), so tr(HWH M) ≤ n max ψ(x) with ψ(x) = tr(HWH A(x)), x a place with directions, and
+M is a sum over n chips, M = Σ A(x_i), so tr(HWH M) ≤ n max ψ(x) with ψ(x) = tr(HWH A(x)), x a place with directions,
+and
 
     tr(W M⁻¹) ≥ (tr WH)² / (n max_x ψ(x)).                                                                (2)
 
-Any H gives a bound; the best H is that of the approximate (weighted) A-optimal design, whose weights are found here by a
-multiplicative algorithm (B. Torsney 1983; equivalence theorem of J. Kiefer and J. Wolfowitz, 1960). A(x) = F(r) P F(r)ᵀ with F affine
-in the place r, so ψ is convex in r and largest at a corner of any polytope around the volume: its maximum over a
-continuous volume is exact over finitely many points (`gfimu.array_search.shapes.Shape.outer_points`). Over free directions it
-is the largest eigenvalue of FᵀHWHF for one axis, the sum of the two largest for two, the trace for three. Keep-out zones
-and spacing only shrink the set, so (2) holds with them.
+Any H gives a bound; the best H is that of the approximate (weighted) A-optimal design, whose weights are found here
+by a multiplicative algorithm (B. Torsney 1983; equivalence theorem of J. Kiefer and J. Wolfowitz, 1960). A(x) = F(r)
+P F(r)ᵀ with F affine in the place r, so ψ is convex in r and largest at a corner of any polytope around the volume:
+its maximum over a continuous volume is exact over finitely many points
+(`gfimu.array_search.shapes.Shape.outer_points`). Over free directions it is the largest eigenvalue of FᵀHWHF for one
+axis, the sum of the two largest for two, the trace for three. Keep-out zones and spacing only shrink the set, so (2)
+holds with them.
 
 For the cube [−1, 1]³ and the ball |r| ≤ 1 the best H is diag(a I, b I), and (2) is in closed form GDOP² ≥
 
@@ -24,8 +26,8 @@ For the cube [−1, 1]³ and the ball |r| ≤ 1 the best H is diag(a I, b I), an
 
 **Condition number.** κ ≥ 1.
 
-**Least fault of a channel.** The leverages of c channels are the diagonal of a projector of rank 6, so the largest is at
-least 6/c.
+**Least fault of a channel.** The leverages of c channels are the diagonal of a projector of rank 6, so the largest is
+at least 6/c.
 """
 
 from __future__ import annotations
@@ -45,10 +47,11 @@ __all__ = ["Certificate", "certify"]
 
 _Vector = NDArray[np.float64]
 
-_ROUNDS, _STEPS = 40, 60  # numerical: of the search of H; any H gives a bound that holds
+_ROUNDS, _STEPS = 100, 60  # numerical: of the search of H; any H gives a bound that holds
 _LEAST_WEIGHT = 1e-7  # numerical: of a support point that is kept
 _CLOSE = 1e-7  # numerical: relative gap at which the search of H ends
-_PATIENCE, _PROGRESS = 4, 1e-5  # numerical: it also ends after so many rounds that raise the bound by less than this
+_PATIENCE, _PROGRESS = 12, 1e-6  # numerical: it also ends after so many rounds that raise the bound by less than this
+_FEW_POINTS, _LESS_PATIENCE = 100, 4  # numerical: rounds over more points cost more and are limited by the polyhedron
 _FEWEST_POINTS = 150  # points of a curved volume from which weights are sought; the bound itself uses all
 
 
@@ -146,12 +149,12 @@ class _Atoms:
             return float(np.einsum("mki,mij,mkj->m", self.frames, blocks, self.frames).max())
         return float(np.linalg.eigvalsh(blocks)[:, 3 - self.k :].sum(axis=1).max())
 
-    def support(self, weights: list[_Vector] | None) -> _Vector:
+    def support(self, weights: list[_Vector]) -> _Vector:
         """Return the rows of chips for the weights to work on, shape (a, k, 12): the best frame at each place."""
         thinned = self.arms[:: max(1, len(self.arms) // _FEWEST_POINTS)] if self.frames is None else self.arms
         if self.frames is not None:
             return np.asarray(self.frames @ self.arms)
-        if weights is None:
+        if not weights:
             axes = LATTICE[:13] / np.linalg.norm(LATTICE[:13], axis=1, keepdims=True)
             frames = axes[:, None] if self.k == 1 else frames_across(axes)
             return np.concatenate([frame @ thinned for frame in frames])
@@ -162,11 +165,12 @@ class _Atoms:
 
 def _trace_bound(atoms: _Atoms, criterion: TraceCriterion) -> float:
     """Largest bound (2) found, for one chip, n = 1."""
-    best, pulled, idle = 0.0, None, 0
+    best, idle = 0.0, 0
+    pulled: list[_Vector] = []
     rows, share = np.empty((0, atoms.k, 12)), np.empty(0)
     for _ in range(_ROUNDS):
         added = atoms.support(pulled)
-        if pulled is not None and atoms.frames is not None:
+        if pulled and atoms.frames is not None:
             added = added[:0]  # a finite list is all there from the first round on
         fresh = 0.3 / len(added) if len(share) and len(added) else 1.0 / max(len(added), 1)
         rows = np.concatenate([rows, added])
@@ -185,7 +189,7 @@ def _trace_bound(atoms: _Atoms, criterion: TraceCriterion) -> float:
         bound = reached**2 / atoms.largest(pulled)
         idle = 0 if bound > best * (1.0 + _PROGRESS) else idle + 1
         best = max(best, bound)
-        if reached / best - 1.0 < _CLOSE or idle >= _PATIENCE:
+        if reached / best - 1.0 < _CLOSE or idle >= (_PATIENCE if len(atoms.arms) < _FEW_POINTS else _LESS_PATIENCE):
             break
         kept = share > _LEAST_WEIGHT
         rows, share = rows[kept], share[kept]

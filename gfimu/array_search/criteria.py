@@ -1,6 +1,7 @@
 """What a search makes small, as functions of the rows of [J Q] of a design.
 
-Every criterion gives the logarithm of its figure, so that two of them can be weighed against each other, in three forms:
+Every criterion gives the logarithm of its figure, so that two of them can be weighed against each other, in three
+forms:
 
 - `Criterion.exact`: the figure of many designs at once;
 - `Criterion.smooth`: a differentiable form with its gradient by the rows, for the polish. Where the figure itself has
@@ -15,9 +16,8 @@ which their certificate follows (`gfimu.array_search.certificate`).
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,19 +25,23 @@ from numpy.typing import NDArray
 __all__ = [
     "Criterion",
     "FaultCriterion",
+    "Goal",
     "KappaCriterion",
     "Term",
     "TraceCriterion",
-    "WeightedCriterion",
     "alpha_leakage",
     "leakage_and_slope",
 ]
 
 _Vector = NDArray[np.float64]
 
-_RIDGE = 1e-10  # numerical: of the mean eigenvalue, added so that designs of rank < 6 have a large figure and no NaN
+_RIDGE = 1e-13  # numerical: of the mean eigenvalue, added so that designs of rank < 6 have a large figure and no NaN
+_UPDATE_RIDGE = (
+    1e-9  # numerical: the same for what is left without one chip, where a large figure would drown the gains
+)
 _FULL = 1e-9  # numerical: least 1 − leverage, so that a channel whose faults never show has a large figure
 _AGREE, _AGREE_ROUGHLY = 1e-6, 1e-3
+_SHARPER = 10.0  # numerical
 
 
 class Criterion(Protocol):
@@ -79,10 +83,10 @@ class Term:
     weight: _Vector
     prior: _Vector
 
-    def inverse(self, information: _Vector) -> _Vector:
-        """Inverse of the information, shape (..., q, q), with a small ridge."""
+    def inverse(self, information: _Vector, share: float = _RIDGE) -> _Vector:
+        """Inverse of the information, shape (..., q, q), with a ridge of a share of its mean eigenvalue."""
         q = information.shape[-1]
-        ridge = _RIDGE * np.trace(information, axis1=-2, axis2=-1)[..., None, None] / q
+        ridge = share * np.trace(information, axis1=-2, axis2=-1)[..., None, None] / q
         return np.linalg.inv(information + (ridge + 1e-30) * np.eye(q) + np.diag(self.prior))
 
     def of_rows(self, rows: _Vector) -> _Vector:
@@ -119,7 +123,7 @@ class TraceCriterion:
         total = np.zeros(candidates.shape[:2])
         for term in self.terms:
             mapped = others @ term.into
-            inverse = term.inverse(np.swapaxes(mapped, -1, -2) @ mapped)[:, None]  # (s, 1, q, q)
+            inverse = term.inverse(np.swapaxes(mapped, -1, -2) @ mapped, _UPDATE_RIDGE)[:, None]  # (s, 1, q, q)
             added = candidates @ term.into  # (s, m, k, q)
             pulled = added @ inverse
             # tr W(M + BᵀB)⁻¹ = tr WH − tr (I + BHBᵀ)⁻¹ BHWHBᵀ with H = M⁻¹: rank k, no inverse of M + BᵀB.
@@ -132,7 +136,6 @@ class TraceCriterion:
                 less = np.trace(np.linalg.solve(np.eye(inner.shape[-1]) + inner, gain), axis1=-2, axis2=-1)
             total += np.einsum("ij,saji->sa", term.weight, inverse) - less
         return 0.5 * np.log(np.maximum(total, 1e-300))
-
 
     def steered(self, others: _Vector, arms: _Vector) -> tuple[_Vector, _Vector]:
         """Return the best direction of a single sensing axis at each of many places, in closed form.
@@ -154,7 +157,7 @@ class TraceCriterion:
         """
         (term,) = self.terms
         mapped, levers = others @ term.into, arms @ term.into
-        inverse = term.inverse(mapped.T @ mapped)
+        inverse = term.inverse(mapped.T @ mapped, _UPDATE_RIDGE)
         turned = np.swapaxes(levers, 1, 2)
         gain = levers @ (inverse @ term.weight @ inverse) @ turned
         lower = np.linalg.inv(np.linalg.cholesky(np.eye(3) + levers @ inverse @ turned))
@@ -175,7 +178,7 @@ class KappaCriterion:
         return rows[..., :6] * np.array([self.scale] * 3 + [1.0] * 3)
 
     @staticmethod
-    def _floor(values: _Vector) -> _Vector:
+    def _floor(values: Any) -> _Vector:
         return np.maximum(values, _RIDGE * values.max(axis=-1, keepdims=True) + 1e-300)
 
     def exact(self, rows: _Vector) -> _Vector:
@@ -209,8 +212,8 @@ class KappaCriterion:
 class FaultCriterion:
     """Least fault of the worst channel that is seen, ``least`` / √(1 − leverage).
 
-    The whitened null space Z of J has |z_i|² = 1 − h_i for channel i, with h_i = J_i (JᵀJ)⁻¹ J_iᵀ its leverage; with equal
-    white noise the information on a fault of that channel is proportional to it (`gfimu.integrity.detectable`).
+    The whitened null space Z of J has |z_i|² = 1 − h_i for channel i, with h_i = J_i (JᵀJ)⁻¹ J_iᵀ its leverage; with
+    equal white noise the information on a fault of that channel is proportional to it (`gfimu.integrity.detectable`).
     """
 
     least: float
@@ -251,36 +254,61 @@ class FaultCriterion:
 
 
 @dataclass(frozen=True)
-class WeightedCriterion:
-    """Sum of weights times logarithms: the weighted geometric mean of several figures."""
+class Goal:
+    """Sum of weights times logarithms of figures: one figure, or a compromise between two.
 
-    parts: Sequence[tuple[float, Criterion]]
+    Parameters
+    ----------
+    parts : tuple of (float, Criterion, bool)
+        Weight, criterion, and whether its worst draw of the tolerance counts; else the nominal array does.
+    """
+
+    parts: tuple[tuple[float, Criterion, bool], ...]
 
     @property
     def kinks(self) -> bool:
-        """Whether any part has kinks."""
-        return any(part.kinks for weight, part in self.parts if weight)
+        """Whether the sum has kinks, so that `smooth` depends on the sharpness."""
+        return any(part.kinks or drawn for _, part, drawn in self.parts)
 
-    def exact(self, rows: _Vector) -> _Vector:
-        """See `Criterion.exact`."""
-        return np.sum([weight * part.exact(rows) for weight, part in self.parts if weight], axis=0)
+    @property
+    def agreement(self) -> float:
+        """Relative difference of the figure below which two ends of a search count as one."""
+        return _AGREE_ROUGHLY if self.kinks else _AGREE
 
-    def smooth(self, rows: _Vector, sharpness: float) -> tuple[_Vector, _Vector]:
-        """See `Criterion.smooth`."""
-        found = [(weight, *part.smooth(rows, sharpness)) for weight, part in self.parts if weight]
-        return (
-            np.sum([weight * value for weight, value, _ in found], axis=0),
-            np.sum([weight * slope for weight, _, slope in found], axis=0),
-        )
+    @property
+    def steering(self) -> TraceCriterion | None:
+        """The criterion for which the best direction of a sensing axis is known in closed form, where it is alone."""
+        criterion, drawn = self.parts[0][1:]
+        alone = len(self.parts) == 1 and not drawn
+        return criterion if alone and isinstance(criterion, TraceCriterion) and len(criterion.terms) == 1 else None
+
+    def exact(self, rows: _Vector) -> float:
+        """Sum for one design under s draws, the first of them nominal, rows of shape (s, c, 12)."""
+        return float(sum(weight * part.exact(rows[: _draws(drawn)]).max() for weight, part, drawn in self.parts))
+
+    def smooth(self, rows: _Vector, sharpness: float) -> tuple[float, _Vector]:
+        """Differentiable form of `exact`, and its gradient, shape (s, c, 12)."""
+        total, slope = 0.0, np.zeros_like(rows)
+        for weight, part, drawn in self.parts:
+            few = rows[: _draws(drawn)]
+            values, slopes = part.smooth(few, sharpness)
+            # Draws differ little in their figure, so their maximum takes a higher power.
+            value, share = _soft_max(values, _SHARPER * sharpness) if drawn else (values[0], np.ones(1))
+            total += weight * float(value)
+            slope[: len(few)] += weight * share[:, None, None] * slopes
+        return total, slope
 
     def exchanged(self, others: _Vector, candidates: _Vector) -> _Vector:
-        """See `Criterion.exchanged`."""
-        return np.sum([weight * part.exchanged(others, candidates) for weight, part in self.parts if weight], axis=0)
+        """Sum with each candidate chip, shape (s, m, k, 12), beside the others, (s, c − k, 12); shape (m,)."""
+        parts = [
+            weight * part.exchanged(others[: _draws(drawn)], candidates[: _draws(drawn)]).max(axis=0)
+            for weight, part, drawn in self.parts
+        ]
+        return np.asarray(np.sum(parts, axis=0))
 
 
-def agreement(criterion: Criterion, *, drawn: bool) -> float:
-    """Relative difference of the figure below which two ends of a search count as one."""
-    return _AGREE_ROUGHLY if criterion.kinks or drawn else _AGREE
+def _draws(drawn: bool) -> int | None:
+    return None if drawn else 1
 
 
 def alpha_leakage(rows: _Vector) -> _Vector:

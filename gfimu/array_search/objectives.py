@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.array_search.criteria import Criterion, FaultCriterion, KappaCriterion, Term, TraceCriterion
+from gfimu.array_search.criteria import Criterion, FaultCriterion, Goal, KappaCriterion, Term, TraceCriterion
 from gfimu.array_search.problem import Problem
 from gfimu.bounds.sample import omega_products_jacobian
 from gfimu.errors import InputError, unknown_name
@@ -113,6 +113,11 @@ class Objective:
     def is_worst(self) -> bool:
         """Whether the worst draw of the tolerance counts."""
         return self.name.endswith(WORST)
+
+    @property
+    def goal(self) -> Goal:
+        """The objective as what a search makes small."""
+        return Goal(((1.0, self.criterion, self.is_worst),))
 
 
 def objective(name: str, problem: Problem, conditions: Conditions) -> Objective:

@@ -10,8 +10,8 @@ import numpy as np
 import scipy.optimize
 from numpy.typing import NDArray
 
-from gfimu.array_search.criteria import Criterion, alpha_leakage, leakage_and_slope
-from gfimu.array_search.exchange import worst
+from gfimu.array_search.criteria import Goal, alpha_leakage, leakage_and_slope
+from gfimu.array_search.exchange import figure
 from gfimu.array_search.problem import Design, Problem, frames_across, rows_of, slopes_by_design
 
 __all__ = ["feasible", "leakage_of", "polish"]
@@ -89,19 +89,19 @@ class _Variables:
         return scipy.optimize.Bounds(np.concatenate(lower), np.concatenate(upper))
 
 
-def polish(problem: Problem, criterion: Criterion, design: Design) -> Design:
+def polish(problem: Problem, goal: Goal, design: Design) -> Design:
     """Return the local optimum near a design; the design itself where nothing varies or nothing is gained.
 
     Parameters
     ----------
     problem : Problem
         What may be built.
-    criterion : Criterion
-        What is to be small; the worst draw of the tolerance counts.
+    goal : Goal
+        What is to be small.
     design : Design
         Where to begin: a design that keeps volume, zones and spacing.
     """
-    kinks = criterion.kinks or problem.draws is not None
+    kinks = goal.kinks
     weights: tuple[float, ...] = _LEAKAGE_WEIGHTS if problem.non_recursive else (0.0,)
     stages = [(sharpness, weight) for weight in weights for sharpness in (_SHARPNESS if kinks else (1.0,))]
     for sharpness, weight in stages:
@@ -110,7 +110,7 @@ def polish(problem: Problem, criterion: Criterion, design: Design) -> Design:
         if not len(numbers):
             return design
         outcome: Any = scipy.optimize.minimize(
-            _objective(variables, criterion, sharpness, weight),
+            _objective(variables, goal, sharpness, weight),
             numbers,
             jac=True,
             method="SLSQP",
@@ -121,7 +121,7 @@ def polish(problem: Problem, criterion: Criterion, design: Design) -> Design:
         if not np.isfinite(outcome.x).all():
             continue
         found = variables.design(np.clip(outcome.x, variables.bounds.lb, variables.bounds.ub))
-        better = weight > 0 or worst(problem, criterion, found) <= worst(problem, criterion, design)
+        better = weight > 0 or figure(problem, goal, found) <= figure(problem, goal, design)
         if better and feasible(problem, found):
             design = found
     return _freed_of_leakage(problem, design) if problem.non_recursive else design
@@ -144,7 +144,7 @@ def leakage_of(design: Design) -> bool:
     return bool(np.abs(alpha_leakage(design.rows)).max() >= _LEAKAGE_FREE)
 
 
-def _objective(variables: _Variables, criterion: Criterion, sharpness: float, weight: float) -> Any:
+def _objective(variables: _Variables, goal: Goal, sharpness: float, weight: float) -> Any:
     problem = variables.problem
     draws = problem.draws
 
@@ -156,11 +156,8 @@ def _objective(variables: _Variables, criterion: Criterion, sharpness: float, we
             axes = np.einsum("snij,nkj->snki", draws[1], design.axes)
         rows = rows_of(places, axes)  # (s, n, k, 12)
         flat = rows.reshape(len(rows), -1, 12)
-        values, slopes = criterion.smooth(flat, sharpness)
-        top = values.max()
-        share = np.exp(sharpness * 10.0 * (values - top))
-        value = float(top + np.log(share.mean()) / (sharpness * 10.0)) if len(values) > 1 else float(top)
-        slope = (slopes * (share / share.sum())[:, None, None]).reshape(rows.shape)
+        value, slope = goal.smooth(flat, sharpness)
+        slope = slope.reshape(rows.shape)
         if weight:
             leak, leak_slope = leakage_and_slope(flat[0])
             value += weight * leak

@@ -138,7 +138,8 @@ class Problem:
     min_spacing_m : float
         Least distance between two chips.
     directions : ndarray, shape (d, 3), optional
-        Directions that sensing axes may take; free without them. Not used for tri-axial chips, nor where sites give them.
+        Directions that sensing axes may take; free without them. Not used for tri-axial chips, nor where sites give
+        them.
     non_recursive : bool
         Whether α = (S a)₁…₃ must be free of ω².
     tolerance : Tolerance, optional
@@ -173,7 +174,9 @@ class Problem:
         free = self.allowed(places)
         if isinstance(self.volume, Sites) and free.sum() < n:
             outside = f" outside the keep-out zones ({len(free)} in all)" if self.keep_out else ""
-            raise InputError(f"{self.volume.name}: {free.sum()} candidate sites{outside} for {n} chips; give at least {n}")
+            raise InputError(
+                f"{self.volume.name}: {free.sum()} candidate sites{outside} for {n} chips; give at least {n}"
+            )
         if isinstance(self.volume, Sites) and self.non_recursive:
             raise InputError("a search free of ω² moves chips; give a volume in place of candidate sites")
         object.__setattr__(self, "_places", places)
@@ -252,7 +255,8 @@ class Problem:
     def random_design(self, pool: Candidates, rng: np.random.Generator) -> Design:
         """Draw a design from the pool that keeps the spacing; raises `InputError` where none was found."""
         for trial in range(_PLACINGS):
-            left, chosen = np.arange(len(pool.site)), []
+            left = np.arange(len(pool.site))
+            chosen: list[int] = []
             while len(left) and len(chosen) < self.n_chips:
                 one = int(rng.choice(left))
                 if trial >= _PLACINGS // 2 and chosen:  # dense: as near to the others as the spacing lets it
@@ -325,7 +329,7 @@ def frames_across(normals: _Vector) -> _Vector:
 
 
 def _combinations(directions: _Vector, k: int, where: str) -> _Vector:
-    """Sets of k directions that are perpendicular to each other, shape (d, k, 3)."""
+    """Return sets of k directions that are perpendicular to each other, shape (d, k, 3)."""
     norms = np.linalg.norm(directions, axis=1)
     if directions.ndim != 2 or not np.isfinite(norms).all() or (norms == 0).any():
         raise InputError(f"{where}: must be rows of three finite numbers, not all zero")

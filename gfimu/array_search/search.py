@@ -1,24 +1,24 @@
 """Search of accelerometer arrays: exchange from random starts, each polished, with a proven lower bound.
 
-A start is a random design. An exchange over candidate places and directions takes it to a design that no single exchange
-makes better; the polish moves it on where places or directions are continuous. Then single chips are put
-elsewhere at random and the same is done again, and what is better is kept. Starts don't know of each other: how many of them
-agree says how sure it is that nothing better exists, where the certificate does not.
+A start is a random design. An exchange over candidate places and directions takes it to a design that no single
+exchange makes better; the polish moves it on where places or directions are continuous. Then single chips are put
+elsewhere at random and the same is done again, and what is better is kept. Starts don't know of each other: how many
+of them agree says how sure it is that nothing better exists, where the certificate does not.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gfimu.array_search.certificate import Certificate, certify
-from gfimu.array_search.criteria import Criterion, agreement
-from gfimu.array_search.exchange import exchange, worst
+from gfimu.array_search.criteria import Goal
+from gfimu.array_search.exchange import exchange, figure
 from gfimu.array_search.objectives import Conditions, Objective, objective
 from gfimu.array_search.polish import feasible, leakage_of, polish
 from gfimu.array_search.problem import Design, Problem
@@ -30,13 +30,14 @@ from gfimu.geometry.kinematics import require_all_motions
 from gfimu.geometry.scoring import Score, score
 from gfimu.short_repr import short_repr
 
-__all__ = ["SearchResult", "best_design", "optimize", "search"]
+__all__ = ["Found", "SearchResult", "best_design", "optimize", "search"]
 
 _Vector = NDArray[np.float64]
 
 _KICKS = 4  # times that one chip of a start is put elsewhere; more find more and cost as much each
 _WORTH_A_POLISH = 0.01  # relative: an exchange that ends this much above the start's best is polished no more
 _ENOUGH = 10  # starts that agree, after which no more are made
+_NEAR = 1e-3  # relative: starts that end this near the best are counted besides
 _UNSEEN = 1e4  # figure over that of a good array, from which a motion counts as not seen
 _DIGITS = 6  # of positions in units, where rounding costs nothing
 
@@ -57,6 +58,8 @@ class SearchResult:
         How many starts were made.
     agreeing : int
         How many of them ended at the best figure: trust the result less if it is one of many.
+    near : int
+        How many ended within 0.1 % of it.
     objective : Objective
         What was made small.
     value : float
@@ -70,6 +73,7 @@ class SearchResult:
     gdop_lower_bound: float
     starts: int
     agreeing: int
+    near: int
     objective: Objective
     value: float
     certificate: Certificate | None
@@ -84,6 +88,7 @@ class SearchResult:
             "gdop_lower_bound": self.gdop_lower_bound,
             "starts": self.starts,
             "agreeing": self.agreeing,
+            "within_0_1_percent": self.near,
             "objective": {
                 "name": self.objective.name,
                 "meaning": self.objective.meaning,
@@ -143,7 +148,7 @@ def optimize(
 
 def search(
     problem: Problem,
-    goal: Objective,
+    wanted: Objective,
     rng: np.random.Generator,
     *,
     starts: int = 40,
@@ -157,7 +162,7 @@ def search(
     ----------
     problem : Problem
         What may be built.
-    goal : Objective
+    wanted : Objective
         What is to be small.
     rng : numpy.random.Generator
         Source of the random starts.
@@ -177,85 +182,94 @@ def search(
     InputError
         If an argument is out of range or the chips don't fit.
     """
-    design, made, agreeing = best_design(problem, goal, rng, starts=starts, report=report)
+    judged = problem if wanted.is_worst or problem.tolerance is None else replace(problem, tolerance=None)
+    found = best_design(judged, wanted.goal, rng, starts=starts, report=report)
     n, k = problem.n_chips, problem.axes_per_chip
-    condition = f"least {goal.meaning} found" + (" with α free of ω²" if problem.non_recursive else "")
+    condition = f"least {wanted.meaning} found" + (" with α free of ω²" if problem.non_recursive else "")
     description = f"{condition} for {n} chips of {k} axes in {problem.volume.name}"
-    array = problem.array(design, name or f"optimized_{n}x{k}", part, description)
-    judged = _judged(problem, goal)
-    value = math.exp(worst(judged, goal.criterion, design))
-    in_box = goal.name == "gdop" and k == 3 and problem.volume.name.startswith("a box") and _centred(problem)
+    array = problem.array(found.design, name or f"optimized_{n}x{k}", part, description)
+    value = math.exp(figure(judged, wanted.goal, found.design))
+    in_box = wanted.name == "gdop" and k == 3 and problem.volume.name.startswith("a box") and _centred(problem)
     return SearchResult(
         array=array,
         score=score(array)[0],
         gdop_lower_bound=gdop_lower_bound(n) if in_box else math.nan,
-        starts=made,
-        agreeing=agreeing,
-        objective=goal,
+        starts=found.starts,
+        agreeing=found.agreeing,
+        near=found.near,
+        objective=wanted,
         value=value,
-        certificate=certify(judged, goal.criterion, value),
+        certificate=certify(judged, wanted.criterion, value),
     )
+
+
+@dataclass(frozen=True)
+class Found:
+    """Best design of a number of starts.
+
+    Parameters
+    ----------
+    design : Design
+        The design.
+    starts, agreeing, near : int
+        Starts made; how many ended at its figure; how many within 0.1 % of it.
+    """
+
+    design: Design
+    starts: int
+    agreeing: int
+    near: int
 
 
 def best_design(
     problem: Problem,
-    goal: Objective,
+    goal: Goal,
     rng: np.random.Generator,
     *,
     starts: int,
     also: tuple[Design, ...] = (),
     report: Callable[[int], None] | None = None,
-) -> tuple[Design, int, int]:
-    """Return the best design, the number of starts made, and how many ended at its figure.
+) -> Found:
+    """Return the best design of a number of starts.
 
     ``also`` are designs to begin from besides the random ones. Raises as `search`.
     """
     if starts < 1:
         raise InputError(f"restarts = {starts}: must be at least 1")
-    judged = _judged(problem, goal)
-    alike = agreement(goal.criterion, drawn=judged.draws is not None)
-    found: list[tuple[float, Design]] = []
+    ends: list[tuple[float, Design]] = []
     made = 0
     for number in range(starts + len(also)):
         given = also[number] if number < len(also) else None
-        value, design = _one_start(judged, goal.criterion, given, rng)
+        value, design = _one_start(problem, goal, given, rng)
         made += 1
-        if feasible(judged, design) and not (judged.non_recursive and leakage_of(design)):
-            found.append((value, design))
+        if feasible(problem, design) and not (problem.non_recursive and leakage_of(design)):
+            ends.append((value, design))
         if report is not None:
             report(made)
-        best = min((one for one, _ in found), default=math.inf)
-        if sum(one < best + alike for one, _ in found) >= _ENOUGH:
+        best = min((one for one, _ in ends), default=math.inf)
+        if sum(one < best + goal.agreement for one, _ in ends) >= _ENOUGH:
             break
-    if not found:
-        raise _failure(judged, None)
-    best, design = min(found, key=lambda item: item[0])
+    if not ends:
+        raise _failure(problem, None)
+    best, design = min(ends, key=lambda item: item[0])
     if _sees_too_little(design):
-        raise _failure(judged, design)
-    return _rounded(judged, goal.criterion, design, best), made, sum(one < best + alike for one, _ in found)
+        raise _failure(problem, design)
+    agreeing, near = (sum(one < best + alike for one, _ in ends) for alike in (goal.agreement, _NEAR))
+    return Found(_rounded(problem, goal, design, best), made, agreeing, near)
 
 
-def _judged(problem: Problem, goal: Objective) -> Problem:
-    """Return the problem with its tolerance only where the objective counts the worst draw."""
-    from dataclasses import replace
-
-    return problem if goal.is_worst or problem.tolerance is None else replace(problem, tolerance=None)
-
-
-def _one_start(
-    problem: Problem, criterion: Criterion, given: Design | None, rng: np.random.Generator
-) -> tuple[float, Design]:
+def _one_start(problem: Problem, goal: Goal, given: Design | None, rng: np.random.Generator) -> tuple[float, Design]:
     pool = problem.candidates(rng)
     begin = problem.random_design(pool, rng) if given is None else given
-    design, value = exchange(problem, criterion, pool, begin, rng)
-    design = polish(problem, criterion, design)
-    value = worst(problem, criterion, design)
+    design, value = exchange(problem, goal, pool, begin, rng)
+    design = polish(problem, goal, design)
+    value = figure(problem, goal, design)
     for _ in range(0 if problem.non_recursive else _KICKS):
         pool = problem.candidates(rng)
-        trial, reached = exchange(problem, criterion, pool, _kicked(problem, pool, design, rng), rng)
+        trial, reached = exchange(problem, goal, pool, _kicked(problem, pool, design, rng), rng)
         if reached < value + _WORTH_A_POLISH:
-            trial = polish(problem, criterion, trial)
-            reached = worst(problem, criterion, trial)
+            trial = polish(problem, goal, trial)
+            reached = figure(problem, goal, trial)
             if reached < value and feasible(problem, trial):
                 design, value = trial, reached
     return value, design
@@ -272,14 +286,14 @@ def _kicked(problem: Problem, pool: Any, design: Design, rng: np.random.Generato
     return design.with_chip(chip, pool.positions[one], pool.axes[one], int(pool.site[one]))
 
 
-def _rounded(problem: Problem, criterion: Criterion, design: Design, value: float) -> Design:
+def _rounded(problem: Problem, goal: Goal, design: Design, value: float) -> Design:
     """Positions without the optimiser's last digits, where that costs nothing."""
     if problem.shape is None:
         return design
     positions = np.round(design.positions, _DIGITS) + 0.0
     low, high = problem.shape.centre - problem.shape.half, problem.shape.centre + problem.shape.half
     tidy = Design(np.clip(positions, low, high), design.axes, design.site)
-    costs_nothing = worst(problem, criterion, tidy) <= value + 1e-6
+    costs_nothing = figure(problem, goal, tidy) <= value + 1e-6
     clean = not (problem.non_recursive and leakage_of(tidy))
     return tidy if costs_nothing and clean and feasible(problem, tidy) else design
 
@@ -304,8 +318,8 @@ def _failure(problem: Problem, design: Design | None) -> GeometryError:
         return GeometryError(f"no geometry of {problem.n_chips} such chips in {where} sees all motions: {error}")
     if problem.non_recursive:
         return GeometryError(
-            f"no geometry of {problem.n_chips} such chips in {where} was found whose angular acceleration is free of ω²; "
-            "use more chips, or leave out the condition and give ω to the estimator"
+            f"no geometry of {problem.n_chips} such chips in {where} was found whose angular acceleration is free "
+            "of ω²; use more chips, or leave out the condition and give ω to the estimator"
         )
     return GeometryError(
         f"no geometry of {problem.n_chips} such chips in {where} was found that sees all motions well; use more chips"

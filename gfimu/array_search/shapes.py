@@ -104,7 +104,7 @@ class Shape:
 
     @property
     def outer_points(self) -> _Vector:
-        """Points whose convex hull contains the shape, shape (v, 3), m: where a convex function has its largest value."""
+        """Points whose convex hull contains the shape, shape (v, 3), m: a convex function is largest at one of them."""
         return self.centre + self.outer
 
 

@@ -1,7 +1,7 @@
 """Position error after a time at rest as a weighted trace of the covariance of [alpha; p].
 
-The covariance of the position is linear in the covariance C of [alpha; p] for channels of unit variance, so its trace is
-tr(W C) with one matrix W for every array: what a search of arrays for least drift needs.
+The covariance of the position is linear in the covariance C of [alpha; p] for channels of unit variance, so its trace
+is tr(W C) with one matrix W for every array: what a search of arrays for least drift needs.
 """
 
 from __future__ import annotations
