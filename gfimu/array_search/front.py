@@ -1,9 +1,9 @@
 """The arrays that are best in two respects: each can be improved in one only at the cost of the other.
 
-Two objectives are weighed against each other: the sum of w log f + (1 − w) log g is made small for several w, each search
-beginning from the last one's array besides its random starts, and what another array beats in both is dropped. Arrays in a
-concave stretch of the front (in logarithms) are not found that way. With ``chips`` or ``size`` as one respect, the other is
-made small for each number of chips, or for the volume shrunk in steps.
+Two objectives are weighed against each other: the sum of w log f + (1 − w) log g is made small for several w, each
+search beginning from the last one's array besides its random starts, and what another array beats in both is dropped.
+Arrays in a concave stretch of the front (in logarithms) are not found that way. With ``chips`` or ``size`` as one
+respect, the other is made small for each number of chips, or for the volume shrunk in steps.
 """
 
 from __future__ import annotations
@@ -143,7 +143,9 @@ def find_front(
             raise unknown_name("objective", name, [*known, f"objectives with {WORST}"])
     stepped = [name for name in names if name in {CHIPS, SIZE}]
     if names[0] == names[1] or len(stepped) == 2:
-        raise InputError(f"a front of {names[0]} and {names[1]}: give two different objectives, or one and chips or size")
+        raise InputError(
+            f"a front of {names[0]} and {names[1]}: give two different objectives, or one and chips or size"
+        )
     if not stepped:
         points = _weighed(problem, conditions, names, rng, starts, report)
         meanings = [objective(name, problem, conditions) for name in names]
@@ -223,7 +225,9 @@ def _numbers(problem: Problem, most: int) -> list[tuple[float, Problem]]:
 
 def _sizes(problem: Problem) -> list[tuple[float, Problem]]:
     if isinstance(problem.volume, Sites):
-        raise InputError("a front over size shrinks the volume; candidate sites have none, give a box, sphere or cylinder")
+        raise InputError(
+            "a front over size shrinks the volume; candidate sites have none, give a box, sphere or cylinder"
+        )
     unit = problem.length_unit_m or problem.unit  # one unit for all sizes, or the figures could not be compared
     return [
         (2.0 * problem.unit * share, replace(problem, volume=problem.volume.scaled(share), length_unit_m=unit))
@@ -236,9 +240,7 @@ def _bound(problem: Problem, wanted: Objective, value: float) -> float | None:
     return None if found is None else found.bound
 
 
-def _part(
-    report: Callable[[float], None] | None, number: int, of: int, starts: int
-) -> Callable[[int], None] | None:
+def _part(report: Callable[[float], None] | None, number: int, of: int, starts: int) -> Callable[[int], None] | None:
     return None if report is None else lambda made: report((number + min(1.0, made / starts)) / of)
 
 

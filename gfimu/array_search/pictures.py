@@ -19,6 +19,7 @@ from gfimu.visual.colours import AFTER_ON_PAPER, BEFORE_ON_PAPER, INK, NOISE_ON_
 mpl.use("Agg")
 
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 __all__ = ["array_picture", "front_picture"]
 
@@ -45,16 +46,13 @@ def front_picture(path: str | Path, front: Front) -> None:
             axes.axvline(bounds[0], label=f"proven bound of {front.names[i]}", **{**style, "ls": ":"})
     for point in front.points:
         mark = point.array.name.removeprefix("front_")
-        axes.annotate(
-            mark, point.values, xytext=(5, 5), textcoords="offset points", fontsize=7, color=css(INK)
-        )
-    for name, meaning, unit, setting in zip(
-        front.names, front.meanings, front.units, (axes.set_xlabel, axes.set_ylabel), strict=True
+        axes.annotate(mark, point.values, xytext=(5, 5), textcoords="offset points", fontsize=7, color=css(INK))
+    for name, meaning, unit, side in zip(
+        front.names, front.meanings, front.units, (axes.xaxis, axes.yaxis), strict=True
     ):
-        setting(f"{meaning}, {unit}" if unit else meaning)
+        side.set_label_text(f"{meaning}, {unit}" if unit else meaning)
         if name == CHIPS:
-            which = axes.xaxis if setting == axes.set_xlabel else axes.yaxis
-            which.set_major_locator(mpl.ticker.MaxNLocator(integer=True))
+            side.set_major_locator(MaxNLocator(integer=True))
     axes.margins(0.08)
     axes.grid(lw=0.3)
     axes.legend(fontsize=8)
@@ -76,8 +74,9 @@ def array_picture(path: str | Path, array: AccelerometerArray, problem: Problem)
     for number, zone in enumerate(problem.keep_out):
         _draw_zone(axes, zone, "keep-out" if number == 0 else None)
     low, high = reach.min(axis=0), reach.max(axis=0)
-    middle, span = (low + high) / 2.0, 1.15 * float((high - low).max()) / 2.0
-    floor = middle[2] - span
+    span = 0.6 * np.maximum(high - low, 0.35 * (high - low).max())  # half of what is shown; flat volumes get some depth
+    low, high = (low + high) / 2.0 - span, (low + high) / 2.0 + span
+    floor = low[2]
     for number, chip in enumerate(array.chips):
         place, colour = chip.position * _MM, css(chip_colour(number, on_paper=True))
         axes.plot([place[0]] * 2, [place[1]] * 2, [floor, place[2]], color=css(PALE), lw=0.7)
@@ -87,19 +86,23 @@ def array_picture(path: str | Path, array: AccelerometerArray, problem: Problem)
         axes.scatter(*place, s=42, color=colour, edgecolors=css(INK), linewidths=0.6)
         axes.text(*(place + 0.06 * unit), chip.name, fontsize=8, color=css(INK))
     axes.set(
-        xlim=(middle[0] - span, middle[0] + span),
-        ylim=(middle[1] - span, middle[1] + span),
-        zlim=(floor, middle[2] + span),
+        xlim=(low[0], high[0]),
+        ylim=(low[1], high[1]),
+        zlim=(low[2], high[2]),
         xlabel="x, mm",
         ylabel="y, mm",
         zlabel="z, mm",
     )
-    axes.set_box_aspect((1, 1, 1))
+    axes.set_box_aspect(tuple(span), zoom=0.9)
     axes.view_init(elev=22, azim=-62)
-    axes.set_title(f"{array.name}: {len(array.chips)} chips of {problem.axes_per_chip} axes", fontsize=10)
+    axes.set_title(f"{array.name}: {len(array.chips)} chips, {_axes(problem)} each", fontsize=10)
     if problem.keep_out or isinstance(volume, Sites):
         axes.legend(fontsize=8, loc="upper left")
     _save(figure, path)
+
+
+def _axes(problem: Problem) -> str:
+    return "1 axis" if problem.axes_per_chip == 1 else f"{problem.axes_per_chip} axes"
 
 
 def _wires(shape: Shape) -> list[NDArray[np.float64]]:
@@ -133,9 +136,7 @@ def _draw_zone(axes: Any, zone: Shape, label: str | None) -> None:
         triangles = ConvexHull(hull).simplices
         axes.plot_trisurf(*(hull.T * _MM), triangles=triangles, shade=False, **style)
     for number, line in enumerate(_wires(zone)):
-        axes.plot(
-            *(line.T * _MM), color=css(BEFORE_ON_PAPER), lw=0.7, label=label if number == 0 else None
-        )
+        axes.plot(*(line.T * _MM), color=css(BEFORE_ON_PAPER), lw=0.7, label=label if number == 0 else None)
 
 
 def _save(figure: Figure, path: str | Path) -> None:

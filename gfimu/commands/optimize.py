@@ -209,7 +209,9 @@ def _sites(wanted: BriefFile, brief: str | Path | None) -> Sites | None:
 
         return sites_of_array(AccelerometerArray.load(path), str(path))
     if path.suffix != ".csv":
-        raise InputError(f"[volume] file = {table.file!r}: candidate sites come from .xml, .toml or .csv; use one of them")
+        raise InputError(
+            f"[volume] file = {table.file!r}: candidate sites come from .xml, .toml or .csv; use one of them"
+        )
     return sites_of_csv(path)
 
 
