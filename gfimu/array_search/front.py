@@ -32,6 +32,7 @@ CHIPS, SIZE = "chips", "size"
 
 _WEIGHTS = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 _SIZES = (1.0, 0.85, 0.7, 0.6, 0.5, 0.4, 0.3)  # of the volume of the brief
+_KICKS = 1  # of each start: neighbours on the front are starts besides
 _TIE = 1e-6  # of the figure of the other respect at the ends of the front, where it would be left to chance
 _ALIKE = 1e-4  # relative: points nearer than this in both figures are one
 
@@ -186,7 +187,13 @@ def _weighed(
             (share, second.criterion, second.is_worst),
         ))  # fmt: skip
         end = best_design(
-            problem, compromise, rng, starts=starts, also=last, report=_part(report, number, len(_WEIGHTS), starts + 1)
+            problem,
+            compromise,
+            rng,
+            starts=starts,
+            kicks=_KICKS,
+            also=last,
+            report=_part(report, number, len(_WEIGHTS), starts + 1),
         )
         last = (end.design,)
         values = (math.exp(figure(problem, goals[0], end.design)), math.exp(figure(problem, goals[1], end.design)))

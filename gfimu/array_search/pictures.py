@@ -71,12 +71,12 @@ def array_picture(path: str | Path, array: AccelerometerArray, problem: Problem)
         for line in _wires(volume):
             axes.plot(*(line.T * _MM), color=css(NOISE_ON_PAPER), lw=0.8)
         reach = (volume.centre + np.array([[1.0], [-1.0]]) * volume.half) * _MM
-    for number, zone in enumerate(problem.keep_out):
-        _draw_zone(axes, zone, "keep-out" if number == 0 else None)
     low, high = reach.min(axis=0), reach.max(axis=0)
     span = 0.6 * np.maximum(high - low, 0.35 * (high - low).max())  # half of what is shown; flat volumes get some depth
     low, high = (low + high) / 2.0 - span, (low + high) / 2.0 + span
     floor = low[2]
+    for number, zone in enumerate(problem.keep_out):
+        _draw_zone(axes, zone, (low, high), "keep-out" if number == 0 else None)
     for number, chip in enumerate(array.chips):
         place, colour = chip.position * _MM, css(chip_colour(number, on_paper=True))
         axes.plot([place[0]] * 2, [place[1]] * 2, [floor, place[2]], color=css(PALE), lw=0.7)
@@ -126,17 +126,20 @@ def _wires(shape: Shape) -> list[NDArray[np.float64]]:
     return [centre + line * half for line in (flat - up, flat + up, *sides)]
 
 
-def _draw_zone(axes: Any, zone: Shape, label: str | None) -> None:
+def _draw_zone(
+    axes: Any, zone: Shape, shown: tuple[NDArray[np.float64], NDArray[np.float64]], label: str | None
+) -> None:
+    """Draw a zone as far as it is within the limits that are shown, mm."""
     from scipy.spatial import ConvexHull
 
-    points = zone.outer_points if zone.name.startswith("a box") else zone.sample(400, np.random.default_rng(0))
-    style: dict[str, Any] = {"color": css(BEFORE_ON_PAPER), "alpha": 0.18, "linewidth": 0.0}
-    hull = zone.outer_points if len(points) < 9 or not zone.name.startswith("a sphere") else points
-    if np.linalg.matrix_rank(hull - hull[0]) == 3:
-        triangles = ConvexHull(hull).simplices
-        axes.plot_trisurf(*(hull.T * _MM), triangles=triangles, shade=False, **style)
+    round_one = zone.name.startswith("a sphere")
+    points = np.clip((zone.sample(400, np.random.default_rng(0)) if round_one else zone.outer_points) * _MM, *shown)
+    if np.linalg.matrix_rank(points - points[0]) == 3:
+        style: dict[str, Any] = {"color": css(BEFORE_ON_PAPER), "alpha": 0.18, "linewidth": 0.0}
+        axes.plot_trisurf(*points.T, triangles=ConvexHull(points).simplices, shade=False, **style)
     for number, line in enumerate(_wires(zone)):
-        axes.plot(*(line.T * _MM), color=css(BEFORE_ON_PAPER), lw=0.7, label=label if number == 0 else None)
+        within = np.clip(line * _MM, *shown)
+        axes.plot(*within.T, color=css(BEFORE_ON_PAPER), lw=0.7, label=label if number == 0 else None)
 
 
 def _save(figure: Figure, path: str | Path) -> None:

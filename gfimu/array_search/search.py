@@ -227,12 +227,14 @@ def best_design(
     rng: np.random.Generator,
     *,
     starts: int,
+    kicks: int = _KICKS,
     also: tuple[Design, ...] = (),
     report: Callable[[int], None] | None = None,
 ) -> Found:
     """Return the best design of a number of starts.
 
-    ``also`` are designs to begin from besides the random ones. Raises as `search`.
+    ``also`` are designs to begin from besides the random ones; ``kicks`` is how often one chip of a start is put
+    elsewhere. Raises as `search`.
     """
     if starts < 1:
         raise InputError(f"restarts = {starts}: must be at least 1")
@@ -240,7 +242,7 @@ def best_design(
     made = 0
     for number in range(starts + len(also)):
         given = also[number] if number < len(also) else None
-        value, design = _one_start(problem, goal, given, rng)
+        value, design = _one_start(problem, goal, given, rng, kicks)
         made += 1
         if feasible(problem, design) and not (problem.non_recursive and leakage_of(design)):
             ends.append((value, design))
@@ -258,13 +260,15 @@ def best_design(
     return Found(_rounded(problem, goal, design, best), made, agreeing, near)
 
 
-def _one_start(problem: Problem, goal: Goal, given: Design | None, rng: np.random.Generator) -> tuple[float, Design]:
+def _one_start(
+    problem: Problem, goal: Goal, given: Design | None, rng: np.random.Generator, kicks: int
+) -> tuple[float, Design]:
     pool = problem.candidates(rng)
     begin = problem.random_design(pool, rng) if given is None else given
     design, value = exchange(problem, goal, pool, begin, rng)
     design = polish(problem, goal, design)
     value = figure(problem, goal, design)
-    for _ in range(0 if problem.non_recursive else _KICKS):
+    for _ in range(0 if problem.non_recursive else kicks):
         pool = problem.candidates(rng)
         trial, reached = exchange(problem, goal, pool, _kicked(problem, pool, design, rng), rng)
         if reached < value + _WORTH_A_POLISH:
