@@ -1,8 +1,8 @@
 """Search of arrays against differential evolution with the same processor time, and against published structures.
 
-Run ``python benchmarks/optimize.py`` (about 10 minutes of one core). Each pair is one problem and one seed: the search of `gfimu
-optimize` makes a few starts, then SciPy's differential evolution gets the same processor time and its own final polish
-besides. Lower is better.
+Run ``python benchmarks/optimize.py`` (about 10 minutes of one core). Each pair is one problem and one seed: the search
+of `gfimu optimize` makes a few starts, then SciPy's differential evolution gets the same processor time and its own
+final polish besides. Lower is better.
 """
 
 from __future__ import annotations
@@ -111,7 +111,7 @@ def against_published(starts: int = 10) -> list[tuple]:
             array.n_channels // k,
             k,
             box(high - low, (low + high) / 2.0),
-            min_spacing_m=0.0 if several else float(apart),
+            min_spacing_m=0.0 if several else min(0.005, float(apart)),
             length_unit_m=array.length_unit,
         )
         ours = search(problem, objective("gdop", problem, Conditions()), np.random.default_rng(0), starts=starts).value

@@ -141,7 +141,7 @@ def find_front(
     known = [*OBJECTIVES, CHIPS, SIZE]
     for name in names:
         if name.removesuffix(WORST) not in known:
-            raise unknown_name("objective", name, [*known, f"objectives with {WORST}"])
+            raise unknown_name("objective", name, known)
     stepped = [name for name in names if name in {CHIPS, SIZE}]
     if names[0] == names[1] or len(stepped) == 2:
         raise InputError(

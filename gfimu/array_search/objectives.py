@@ -139,7 +139,7 @@ def objective(name: str, problem: Problem, conditions: Conditions) -> Objective:
     """
     plain = name.removesuffix(WORST)
     if plain not in OBJECTIVES:
-        raise unknown_name("objective", name, [*OBJECTIVES, f"each with {WORST}"])
+        raise unknown_name("objective", name, OBJECTIVES)
     if plain != name and problem.tolerance is None:
         raise InputError(f"objective {name}: a worst case needs [tolerance] in the brief (or --position-tolerance-m)")
     meaning, unit, make = OBJECTIVES[plain]

@@ -254,12 +254,15 @@ class Problem:
 
     def random_design(self, pool: Candidates, rng: np.random.Generator) -> Design:
         """Draw a design from the pool that keeps the spacing; raises `InputError` where none was found."""
+        out = np.linalg.norm(pool.positions - pool.positions.mean(axis=0), axis=1)
+        outermost = np.argsort(-out, kind="stable")[: max(1, len(out) // 20)]
         for trial in range(_PLACINGS):
             left = np.arange(len(pool.site))
             chosen: list[int] = []
+            dense = trial >= _PLACINGS // 2  # from far out, each as near to the others as the spacing lets it
             while len(left) and len(chosen) < self.n_chips:
-                one = int(rng.choice(left))
-                if trial >= _PLACINGS // 2 and chosen:  # dense: as near to the others as the spacing lets it
+                one = int(rng.choice(left if chosen or not dense else outermost))
+                if dense and chosen:
                     one = int(left[np.argmin(_nearest(pool.positions[left], pool.positions[chosen]))])
                 chosen.append(one)
                 left = left[self.apart(pool, pool.positions[chosen[-1:]], pool.site[chosen[-1:]])[left]]

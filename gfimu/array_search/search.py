@@ -35,6 +35,7 @@ __all__ = ["Found", "SearchResult", "best_design", "optimize", "search"]
 _Vector = NDArray[np.float64]
 
 _KICKS = 4  # times that one chip of a start is put elsewhere; more find more and cost as much each
+_MORE_KICKS = 5  # times as many where nothing is polished, so that they cost little
 _WORTH_A_POLISH = 0.01  # relative: an exchange that ends this much above the start's best is polished no more
 _ENOUGH = 10  # starts that agree, after which no more are made
 _NEAR = 1e-3  # relative: starts that end this near the best are counted besides
@@ -238,6 +239,8 @@ def best_design(
     """
     if starts < 1:
         raise InputError(f"restarts = {starts}: must be at least 1")
+    if problem.shape is None and not problem.turns:
+        kicks *= _MORE_KICKS
     ends: list[tuple[float, Design]] = []
     made = 0
     for number in range(starts + len(also)):
@@ -271,7 +274,8 @@ def _one_start(
     for _ in range(0 if problem.non_recursive else kicks):
         pool = problem.candidates(rng)
         trial, reached = exchange(problem, goal, pool, _kicked(problem, pool, design, rng), rng)
-        if reached < value + _WORTH_A_POLISH:
+        if reached < value + _MORE_KICKS = 5  # times as many where nothing is polished, so that they cost little
+_WORTH_A_POLISH:
             trial = polish(problem, goal, trial)
             reached = figure(problem, goal, trial)
             if reached < value and feasible(problem, trial):

@@ -42,6 +42,7 @@ NAMES_A_FILE = {
     "recording",
     "column_map",
     "plan",
+    "brief",
 }
 
 CALLS = {
