@@ -274,8 +274,7 @@ def _one_start(
     for _ in range(0 if problem.non_recursive else kicks):
         pool = problem.candidates(rng)
         trial, reached = exchange(problem, goal, pool, _kicked(problem, pool, design, rng), rng)
-        if reached < value + _MORE_KICKS = 5  # times as many where nothing is polished, so that they cost little
-_WORTH_A_POLISH:
+        if reached < value + _WORTH_A_POLISH:
             trial = polish(problem, goal, trial)
             reached = figure(problem, goal, trial)
             if reached < value and feasible(problem, trial):
