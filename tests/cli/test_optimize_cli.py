@@ -1,7 +1,9 @@
 """`gfimu optimize`: brief, sites, pictures, front, JSON, and what is wrong with an input."""
 
 import json
+import re
 import tomllib
+from pathlib import Path
 
 import matplotlib.image
 import numpy as np
@@ -60,6 +62,27 @@ def test_json_keeps_the_keys_it_had(gfimu_command):
     assert found["gdop_lower_bound"] == pytest.approx(np.sqrt(9 / 8))
     assert found["certificate"]["bound"] == pytest.approx(np.sqrt(9 / 8))
     assert found["certificate"]["gap"] < 1e-6
+
+
+def rows_of_the_page(root):
+    page = (root / "docs" / "geometry.md").read_text(encoding="utf-8")
+    return re.findall(r"^\| `gfimu (optimize --chips [^`]+)` \| ([\d.]+) \| ([\d.]+) \|$", page, re.MULTILINE)
+
+
+PAGE_ROWS = rows_of_the_page(Path(__file__).parents[2])
+
+
+def test_the_page_has_its_rows():
+    assert len(PAGE_ROWS) == 5
+
+
+@pytest.mark.parametrize(("command", "gdop", "bound"), PAGE_ROWS)
+def test_the_page_quotes_what_the_command_finds(gfimu_command, command, gdop, bound):
+    found = json.loads(gfimu_command(*command.split(), "--json").stdout)
+    assert f"{found['objective']['value']:.4f}" == gdop
+    assert f"{found['certificate']['bound']:.4f}" == bound
+    assert found["agreeing"] == 10
+    assert found["starts"] <= 12
 
 
 def test_sites_come_from_mjcf_and_array_files(gfimu_command, here, project_root):
