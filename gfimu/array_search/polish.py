@@ -23,7 +23,8 @@ _LEAKAGE_WEIGHTS = (1.0, 1e2, 1e4, 1e6)
 _LEAKAGE_FREE = 1e-9
 _NEAR = 0.5  # of the unit: pairs of chips nearer than this, beyond the spacing, are watched during the polish
 _SLACK = 1e-7  # numerical: of the unit, by which a constraint may fail
-_STEPS = 300
+_STEPS, _FEWEST_STEPS = 300, 30  # numerical: for up to `_MANY` variables, and for very many: a step costs their cube
+_MANY = 100
 _PRECISION = 1e-12  # numerical: of the logarithm of the figure
 
 
@@ -116,7 +117,7 @@ def polish(problem: Problem, goal: Goal, design: Design) -> Design:
             method="SLSQP",
             bounds=variables.bounds,
             constraints=_constraints(variables, numbers),
-            options={"maxiter": _STEPS, "ftol": _PRECISION},
+            options={"maxiter": _steps(len(numbers)), "ftol": _PRECISION},
         )
         if not np.isfinite(outcome.x).all():
             continue
@@ -125,6 +126,10 @@ def polish(problem: Problem, goal: Goal, design: Design) -> Design:
         if better and feasible(problem, found):
             design = found
     return _freed_of_leakage(problem, design) if problem.non_recursive else design
+
+
+def _steps(variables: int) -> int:
+    return max(_FEWEST_STEPS, int(_STEPS * min(1.0, (_MANY / max(variables, 1)) ** 2)))
 
 
 def feasible(problem: Problem, design: Design) -> bool:

@@ -24,7 +24,7 @@ __all__ = ["Candidates", "Design", "Problem", "Sites", "Tolerance", "rows_of", "
 
 _Vector = NDArray[np.float64]
 
-_RANDOM_POINTS = 100  # positions added to the anchors of a volume in each start
+_RANDOM_POINTS, _POINTS_PER_CHIP = 100, 5  # least number of positions added to the anchors of a volume in each start
 _PLACINGS = 30  # random orders tried before chips are said not to fit
 _TOUCH = 1e-9  # numerical: of the unit
 _PERPENDICULAR = 1e-6  # numerical: cosine of two axes of one chip
@@ -241,7 +241,9 @@ class Problem:
             site = np.repeat(free, [len(one) for one in frames])
             return Candidates(self._places[site] / self.unit, np.concatenate(frames), site)
         shape = self.volume
-        points = np.vstack([shape.centre + shape.anchors, shape.sample(_RANDOM_POINTS, rng)])
+        points = np.vstack(
+            [shape.centre + shape.anchors, shape.sample(max(_RANDOM_POINTS, _POINTS_PER_CHIP * self.n_chips), rng)]
+        )
         points = points[self.allowed(points)]
         if not len(points):
             raise InputError(f"the keep-out zones leave nothing of {shape.name}; make them smaller")

@@ -36,6 +36,7 @@ _Vector = NDArray[np.float64]
 
 _KICKS = 4  # times that one chip of a start is put elsewhere; more find more and cost as much each
 _MORE_KICKS = 5  # times as many where nothing is polished, so that they cost little
+_MANY_CHIPS = 24  # from which on a polish costs so much that no chip is put elsewhere
 _WORTH_A_POLISH = 0.01  # relative: an exchange that ends this much above the start's best is polished no more
 _ENOUGH = 10  # starts that agree, after which no more are made
 _NEAR = 1e-3  # relative: starts that end this near the best are counted besides
@@ -241,6 +242,8 @@ def best_design(
         raise InputError(f"restarts = {starts}: must be at least 1")
     if problem.shape is None and not problem.turns:
         kicks *= _MORE_KICKS
+    elif problem.n_chips > _MANY_CHIPS:
+        kicks = 0
     ends: list[tuple[float, Design]] = []
     made = 0
     for number in range(starts + len(also)):
