@@ -14,9 +14,9 @@ import numpy as np
 import scipy.optimize
 
 from gfimu.array_search.objectives import Conditions, objective
-from gfimu.array_search.problem import Problem, frames_across, rows_of
+from gfimu.array_search.problem import Problem, rows_of
 from gfimu.array_search.search import search
-from gfimu.array_search.shapes import box, cylinder, sphere
+from gfimu.array_search.shapes import box, cylinder, frames_across, sphere
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.geometry.scoring import score
 

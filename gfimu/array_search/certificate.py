@@ -40,8 +40,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.array_search.criteria import Criterion, FaultCriterion, KappaCriterion, TraceCriterion
-from gfimu.array_search.problem import Problem, Sites, frames_across, rows_of
-from gfimu.array_search.shapes import LATTICE
+from gfimu.array_search.problem import Problem, Sites, rows_of
+from gfimu.array_search.shapes import LATTICE, frames_across
 
 __all__ = ["Certificate", "certify"]
 
@@ -82,7 +82,8 @@ class Certificate:
         """One line for people."""
         if self.gap < 1e-6:
             return f"certificate: optimal, equal to a proven bound, {self.bound:.5g} ({self.reason})"
-        return f"certificate: within {100.0 * self.gap:.2g} % of a proven bound, {self.bound:.5g} ({self.reason})"
+        share = f"{100.0 * self.gap:.2g}" if self.gap < 0.095 else f"{100.0 * self.gap:.0f}"
+        return f"certificate: within {share} % of a proven bound, {self.bound:.5g} ({self.reason})"
 
 
 def certify(problem: Problem, criterion: Criterion, value: float) -> Certificate | None:

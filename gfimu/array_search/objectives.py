@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gfimu.array_search.criteria import Criterion, FaultCriterion, Goal, KappaCriterion, Term, TraceCriterion
 from gfimu.array_search.problem import Problem
 from gfimu.bounds.sample import omega_products_jacobian
-from gfimu.errors import InputError, unknown_name
+from gfimu.errors import GeometryError, InputError, unknown_name
 from gfimu.integrity.detectable import least_fault
 from gfimu.parts.part import Part
 from gfimu.parts.part_file import PartFile
@@ -27,6 +27,7 @@ WORST = "_worst"
 _Vector = NDArray[np.float64]
 
 _UNSEEN_PRIOR = 1e-8  # numerical: information on the products of ω, so that those no channel sees do no harm
+_FEWEST_CHANNELS = {"gdop_joint": 9, "rate": 9, "fault": 7}  # six motions, and ω or a check besides
 _RATE_HZ = 100.0  # at which the data sheets state the noise
 
 
@@ -136,12 +137,20 @@ def objective(name: str, problem: Problem, conditions: Conditions) -> Objective:
     ------
     InputError
         If there is no such objective, or a worst case is asked for without a tolerance.
+    GeometryError
+        If so few channels can't have a finite figure.
     """
     plain = name.removesuffix(WORST)
     if plain not in OBJECTIVES:
         raise unknown_name("objective", name, OBJECTIVES)
     if plain != name and problem.tolerance is None:
         raise InputError(f"objective {name}: a worst case needs [tolerance] in the brief (or --position-tolerance-m)")
+    channels, fewest = problem.n_chips * problem.axes_per_chip, _FEWEST_CHANNELS.get(plain, 6)
+    if channels < fewest:
+        raise GeometryError(
+            f"objective {name}: {channels} channels; it is infinite for fewer than {fewest}: "
+            "use more chips or more axes"
+        )
     meaning, unit, make = OBJECTIVES[plain]
     worst = ", worst over the tolerances" if plain != name else ""
     return Objective(name, meaning + worst, unit, make(problem, conditions))

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from gfimu.array_search.criteria import Goal, alpha_leakage, leakage_and_slope
 from gfimu.array_search.exchange import figure
-from gfimu.array_search.problem import Design, Problem, frames_across, rows_of, slopes_by_design
+from gfimu.array_search.problem import Design, Problem, rows_of, slopes_by_design
+from gfimu.array_search.shapes import frames_across
 
 __all__ = ["feasible", "leakage_of", "polish"]
 

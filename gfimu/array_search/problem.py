@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from gfimu.array_search.shapes import LATTICE, Shape
+from gfimu.array_search.shapes import LATTICE, Shape, frames_across
 from gfimu.errors import GeometryError, InputError
 from gfimu.geometry.array import AccelerometerArray, Chip
 
@@ -323,14 +323,6 @@ def slopes_by_design(slope: _Vector, positions: _Vector, axes: _Vector) -> tuple
     by_position = np.cross(axes, lever) + np.einsum("...ij,...j->...i", product, axes)
     by_axis = np.cross(lever, positions) + direct + np.einsum("...ij,...j->...i", product, positions)
     return by_position, by_axis
-
-
-def frames_across(normals: _Vector) -> _Vector:
-    """Two sensing axes across each unit normal, shape (n, 2, 3): columns of the reflection of z onto the normal."""
-    sign = np.where(normals[:, 2] < 0, -1.0, 1.0)
-    mirror = normals + sign[:, None] * np.array([0.0, 0.0, 1.0])
-    share = normals[:, :2] / (1.0 + np.abs(normals[:, 2:]))
-    return np.eye(3)[:2] - mirror[:, None] * share[:, :, None]
 
 
 def _combinations(directions: _Vector, k: int, where: str) -> _Vector:

@@ -2,7 +2,7 @@
 
 A start is a random design. An exchange over candidate places and directions takes it to a design that no single
 exchange makes better; the polish moves it on where places or directions are continuous. Then single chips are put
-elsewhere at random and the same is done again, and what is better is kept. Starts don't know of each other: how many
+elsewhere at random and the same is done again, and what is better is kept. Starts are independent: how many
 of them agree says how sure it is that nothing better exists, where the certificate does not.
 """
 
@@ -40,7 +40,7 @@ _MANY_CHIPS = 24  # from which on a polish costs so much that no chip is put els
 _WORTH_A_POLISH = 0.01  # relative: an exchange that ends this much above the start's best is polished no more
 _ENOUGH = 10  # starts that agree, after which no more are made
 _NEAR = 1e-3  # relative: starts that end this near the best are counted besides
-_UNSEEN = 1e4  # figure over that of a good array, from which a motion counts as not seen
+_UNSEEN = 1e-4  # singular value of J, lengths in units, below which a motion counts as not seen
 _DIGITS = 6  # of positions in units, where rounding costs nothing
 
 
@@ -191,10 +191,16 @@ def search(
     description = f"{condition} for {n} chips of {k} axes in {problem.volume.name}"
     array = problem.array(found.design, name or f"optimized_{n}x{k}", part, description)
     value = math.exp(figure(judged, wanted.goal, found.design))
+    figures = score(array)[0]
+    if wanted.name.startswith("gdop_joint") and not math.isfinite(figures.gdop_joint):
+        raise GeometryError(
+            f"no geometry of {n} such chips in {problem.volume.name} was found that separates α and p from the "
+            "products of ω; use more chips or more axes"
+        )
     in_box = wanted.name == "gdop" and k == 3 and problem.volume.name.startswith("a box") and _centred(problem)
     return SearchResult(
         array=array,
-        score=score(array)[0],
+        score=figures,
         gdop_lower_bound=gdop_lower_bound(n) if in_box else math.nan,
         starts=found.starts,
         agreeing=found.agreeing,
@@ -309,7 +315,7 @@ def _rounded(problem: Problem, goal: Goal, design: Design, value: float) -> Desi
 
 
 def _sees_too_little(design: Design) -> bool:
-    return bool(np.linalg.svd(design.rows[:, :6], compute_uv=False)[-1] < 1.0 / _UNSEEN)
+    return bool(np.linalg.svd(design.rows[:, :6], compute_uv=False)[-1] < _UNSEEN)
 
 
 def _centred(problem: Problem) -> bool:

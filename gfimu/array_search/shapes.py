@@ -17,7 +17,7 @@ from scipy.spatial import ConvexHull
 
 from gfimu.errors import InputError
 
-__all__ = ["LATTICE", "Shape", "box", "cylinder", "sphere"]
+__all__ = ["LATTICE", "Shape", "box", "cylinder", "frames_across", "sphere"]
 
 _Vector = NDArray[np.float64]
 
@@ -201,6 +201,14 @@ def cylinder(radius_m: float, height_m: float, axis: str = "z", centre_m: ArrayL
         rings(12, radius_m, middles),
         rings(_SIDES, radius_m / math.cos(math.pi / _SIDES), levels),
     )
+
+
+def frames_across(normals: _Vector) -> _Vector:
+    """Two sensing axes across each unit normal, shape (n, 2, 3): columns of the reflection of z onto the normal."""
+    sign = np.where(normals[:, 2] < 0, -1.0, 1.0)
+    mirror = normals + sign[:, None] * np.array([0.0, 0.0, 1.0])
+    share = normals[:, :2] / (1.0 + np.abs(normals[:, 2:]))
+    return np.eye(3)[:2] - mirror[:, None] * share[:, :, None]
 
 
 def _directions() -> _Vector:

@@ -7,6 +7,7 @@ from gfimu.array_search.certificate import certify
 from gfimu.array_search.objectives import Conditions, objective
 from gfimu.array_search.problem import Problem, Sites
 from gfimu.array_search.shapes import box, cylinder, sphere
+from gfimu.errors import GeometryError
 
 CUBE, BALL, CAN = box((0.1, 0.1, 0.1)), sphere(0.05), cylinder(0.05, 0.08)
 
@@ -51,5 +52,7 @@ def test_directions_along_the_body_raise_the_bound():
     assert bound(body) > 1.02 * bound(free)
 
 
-def test_six_channels_show_no_fault_and_have_no_bound():
-    assert bound(Problem(6, 1, CUBE), "fault") is None
+@pytest.mark.parametrize(("name", "chips"), [("fault", 6), ("rate", 8), ("gdop_joint", 8)])
+def test_too_few_channels_have_no_finite_figure(name, chips):
+    with pytest.raises(GeometryError, match=f"{chips} channels; it is infinite for fewer than {chips + 1}"):
+        bound(Problem(chips, 1, CUBE), name)

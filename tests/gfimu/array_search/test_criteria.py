@@ -10,8 +10,8 @@ from gfimu.array_search.criteria import Goal, alpha_leakage, leakage_and_slope
 from gfimu.array_search.exchange import drawn_rows, figure
 from gfimu.array_search.objectives import OBJECTIVES, Conditions, objective
 from gfimu.array_search.polish import _objective, _Variables
-from gfimu.array_search.problem import Design, Problem, Tolerance, frames_across, rows_of, slopes_by_design
-from gfimu.array_search.shapes import box
+from gfimu.array_search.problem import Design, Problem, Tolerance, rows_of, slopes_by_design
+from gfimu.array_search.shapes import box, frames_across
 from gfimu.bounds.sample import alpha_std, rate_bound
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.geometry.scoring import score

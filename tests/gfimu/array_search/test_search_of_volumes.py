@@ -49,6 +49,9 @@ def test_a_keep_out_zone_costs_and_the_bound_still_holds():
     free = found(Problem(4, 3, CUBE))
     barred = found(Problem(4, 3, CUBE, (sphere(0.03, (0.05, 0.05, 0.05)), sphere(0.03, (-0.05, 0.05, 0.05)))))
     assert barred.value > 1.01 * free.value
+    places = barred.array.chip_positions
+    apart = np.linalg.norm(places[:, None] - [[0.05, 0.05, 0.05], [-0.05, 0.05, 0.05]], axis=-1)
+    assert np.abs(apart - 0.03).min() < 1e-6  # the polish slides along the wall of a zone
     assert barred.certificate.bound == pytest.approx(free.value, rel=1e-6)
 
 
