@@ -83,11 +83,17 @@ class Term:
     weight: _Vector
     prior: _Vector
 
-    def inverse(self, information: _Vector, share: float = _RIDGE) -> _Vector:
-        """Inverse of the information, shape (..., q, q), with a ridge of a share of its mean eigenvalue."""
+    def inverse(self, information: _Vector) -> _Vector:
+        """Inverse of the information, shape (..., q, q), with a small ridge."""
         q = information.shape[-1]
-        ridge = share * np.trace(information, axis1=-2, axis2=-1)[..., None, None] / q
+        ridge = _RIDGE * np.trace(information, axis1=-2, axis2=-1)[..., None, None] / q
         return np.linalg.inv(information + (ridge + 1e-30) * np.eye(q) + np.diag(self.prior))
+
+    def bounded_inverse(self, information: _Vector) -> _Vector:
+        """Inverse of information that may be singular, positive definite in spite of rounding, shape (..., q, q)."""
+        values, vectors = np.linalg.eigh(information + np.diag(self.prior))
+        least = _UPDATE_RIDGE * values.mean(axis=-1, keepdims=True) + 1e-30
+        return (vectors / np.maximum(values, least)[..., None, :]) @ np.swapaxes(vectors, -1, -2)
 
     def of_rows(self, rows: _Vector) -> _Vector:
         """Value for rows of shape (..., c, 12), shape (...,)."""
@@ -123,7 +129,7 @@ class TraceCriterion:
         total = np.zeros(candidates.shape[:2])
         for term in self.terms:
             mapped = others @ term.into
-            inverse = term.inverse(np.swapaxes(mapped, -1, -2) @ mapped, _UPDATE_RIDGE)[:, None]  # (s, 1, q, q)
+            inverse = term.bounded_inverse(np.swapaxes(mapped, -1, -2) @ mapped)[:, None]  # (s, 1, q, q)
             added = candidates @ term.into  # (s, m, k, q)
             pulled = added @ inverse
             # tr W(M + BᵀB)⁻¹ = tr WH − tr (I + BHBᵀ)⁻¹ BHWHBᵀ with H = M⁻¹: rank k, no inverse of M + BᵀB.
@@ -157,7 +163,7 @@ class TraceCriterion:
         """
         (term,) = self.terms
         mapped, levers = others @ term.into, arms @ term.into
-        inverse = term.inverse(mapped.T @ mapped, _UPDATE_RIDGE)
+        inverse = term.bounded_inverse(mapped.T @ mapped)
         turned = np.swapaxes(levers, 1, 2)
         gain = levers @ (inverse @ term.weight @ inverse) @ turned
         lower = np.linalg.inv(np.linalg.cholesky(np.eye(3) + levers @ inverse @ turned))

@@ -93,6 +93,13 @@ def test_axes_take_the_directions_of_the_list(directions):
     assert np.isclose(np.abs(two.array.axes @ units.T), 1.0, atol=1e-9).any(axis=1).all()
 
 
+def test_as_few_channels_as_can_separate_the_rate_are_searched():
+    """Without one of nine channels the information on α, p and the products of ω is singular."""
+    problem = Problem(9, 1, CUBE, min_spacing_m=0.0)
+    result = found(problem, "gdop_joint", starts=2)
+    assert result.value == pytest.approx(result.score.gdop_joint, rel=1e-5)
+
+
 def test_the_least_condition_number_and_fault_meet_their_bounds():
     kappa = found(Problem(8, 1, CUBE), "kappa", starts=1)
     assert kappa.value == pytest.approx(kappa.score.condition_number, rel=1e-6)
