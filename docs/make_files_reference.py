@@ -18,10 +18,10 @@ PAGE = Path(__file__).parent / "files.md"
 INTRODUCTION = """\
 # Files key by key
 <!-- made by make_files_reference.py; edit the schemas that are named below -->
-Arrays, parts, column maps, twins, scenarios, frames, stages and plans are TOML files. `gfimu list arrays` lists those
-that come with gfimu, `gfimu show cube12` prints one, and `gfimu new array --out my_array.toml` writes a commented one
-to edit. A key that is not on this page is refused, with the nearest one that is; part files may hold further keys for
-people.
+Arrays, parts, column maps, twins, scenarios, frames, stages, plans and briefs are TOML files. `gfimu list arrays` lists
+those that come with gfimu, `gfimu show cube12` prints one, and `gfimu new array --out my_array.toml` writes a commented
+one to edit. A key that is not on this page is refused, with the nearest one that is; part files may hold further keys
+for people.
 
 Editors with [taplo](https://taplo.tamasfe.dev) (Even Better TOML in VS Code) complete and check these files by a JSON
 schema. `gfimu new array --out my_array.toml --schema array.schema.json` writes the file, the schema, and the line

@@ -248,6 +248,15 @@ ROOMS = {
     "gfimu.geometry": {"gfimu.bounds.sample", "gfimu.files", "gfimu.parts.files"},
     "gfimu.importing": {"gfimu.files", "gfimu.geometry.array"},
     "gfimu.recording": {"gfimu.files", "gfimu.geometry", "gfimu.importing", "gfimu.parts", "gfimu.rate.integration"},
+    "gfimu.array_search": {
+        "gfimu.bounds.sample",
+        "gfimu.files",
+        "gfimu.geometry",
+        "gfimu.integrity.detectable",
+        "gfimu.parts",
+        "gfimu.position_drift",
+        "gfimu.visual.colours",
+    },
     "gfimu.crash": {
         "gfimu.geometry",
         "gfimu.motion.estimation",

@@ -107,7 +107,11 @@ JOBS: dict[str, tuple[Entry, ...]] = {
             "Score array geometries: condition number, GDOP, errors, what ω² leaves, what ω and which faults are seen.",
             "score",
         ),
-        Entry("optimize", "Search the geometry of least GDOP for a number of chips in a box.", "score"),
+        Entry(
+            "optimize",
+            "Search the array of chips in a volume for which an objective is least, or the front of two objectives.",
+            "optimize",
+        ),
         Entry(
             "drift",
             "Position-drift budget of an array in closed form, with a Monte Carlo; the drift of a recording at rest.",

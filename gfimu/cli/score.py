@@ -1,10 +1,9 @@
-"""`gfimu score` and `gfimu optimize`: compare array geometries, and search better ones."""
+"""`gfimu score`: compare array geometries."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -20,21 +19,20 @@ from gfimu.cli.axis_options import (
     PointStdOption,
     RotationStdOption,
 )
-from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, print_text, progress
+from gfimu.cli.output import JsonOption, print_json, print_table, print_text
 
 if TYPE_CHECKING:
     from gfimu.geometry.scoring import Score
     from gfimu.known_axis.accuracy.bounds import AxisBounds
 
-__all__ = ["register"]
+__all__ = ["print_scores", "register"]
 
 _MG = 9.80665e-3  # numerical: m/s²
 
 
 def register(app: typer.Typer) -> None:
-    """Add the commands."""
+    """Add the command."""
     app.command(name="score")(_score)
-    app.command(name="optimize")(_optimize)
 
 
 def _score(
@@ -118,68 +116,14 @@ def _score(
         print_json(units | {"arrays": [entry.to_dict() for entry in scores]})
         return
     if figures:
-        _print_scores(figures, f"{speed:.4g} rad/s about {spin_axis} and channel noise {noise:.4g} m/s²")
+        print_scores(figures, f"{speed:.4g} rad/s about {spin_axis} and channel noise {noise:.4g} m/s²")
         _print_protection(figures)
     if bounds:
         _print_bounds(bounds, noise, sample_rate_hz)
 
 
-def _optimize(
-    chips: Annotated[int, typer.Option("--chips", help="Number of chips.")],
-    axes_per_chip: Annotated[int, typer.Option("--axes-per-chip", help="Sensing axes of a chip: 1, 2 or 3.")] = 3,
-    box: Annotated[
-        tuple[float, float, float], typer.Option("--box-m", help="Edges of the box around the body origin, m.")
-    ] = (0.1, 0.1, 0.1),
-    spacing: Annotated[float, typer.Option("--min-spacing-m", help="Least distance between chips, m.")] = 0.005,
-    non_recursive: Annotated[
-        bool, typer.Option("--non-recursive", help="Only geometries whose angular acceleration is free of ω².")
-    ] = False,
-    restarts: Annotated[int, typer.Option("--restarts", help="Number of starts to polish.")] = 40,
-    seed: Annotated[int, typer.Option("--seed", help="Seed of the random starts.")] = 0,
-    out: Annotated[Path | None, typer.Option("--out", help="Write the geometry as an array file (.toml).")] = None,
-    as_json: JsonOption = False,
-) -> None:
-    """Search the geometry of least GDOP for a number of chips in a box.
-
-    Example: gfimu optimize --chips 5 --non-recursive --out best5.toml
-    """
-    from gfimu.commands.optimize import optimize
-
-    with progress("searching geometries", total=restarts) as advance:
-        result = optimize(
-            chips,
-            axes_per_chip=axes_per_chip,
-            box_m=box,
-            min_spacing_m=spacing,
-            non_recursive=non_recursive,
-            restarts=restarts,
-            seed=seed,
-            out=out,
-            report=advance,
-        )
-    if as_json:
-        print_json(result.to_dict())
-        return
-    print_table(
-        f"{result.array.name}: positions in the body frame",
-        ["chip", "x m", "y m", "z m", "sensing axes"],
-        [
-            [
-                chip.name,
-                *(f"{value:.5f}" for value in chip.position),
-                "any, e.g. body axes" if axes_per_chip == 3 else "  ".join(_vector(axis) for axis in chip.axes),
-            ]
-            for chip in result.array.chips
-        ],
-    )
-    _print_scores([result.score], f"1 rev/s about z and channel noise {result.score.noise_m_s2:.4g} m/s²")
-    bound = "" if math.isnan(result.gdop_lower_bound) else f"; no geometry is below {result.gdop_lower_bound:.4f}"
-    typer.echo(f"{result.agreeing} of {result.starts} starts ended at this GDOP{bound}")
-    if out is not None:
-        print_paths([("the array", out)])
-
-
-def _print_scores(scores: list[Score], condition: str) -> None:
+def print_scores(scores: list[Score], condition: str) -> None:
+    """Print the figures of merit of arrays; ``condition`` is that of the rate bound, in words."""
     from gfimu.geometry.scoring import ranking_remark
 
     units = sorted({entry.length_unit_m for entry in scores})
@@ -364,7 +308,3 @@ def _contaminated(entry: Score) -> str:
     if not names:
         return "none"
     return "α and p" if len(names) == 6 else " ".join(name.replace("alpha", "α") for name in names)
-
-
-def _vector(axis: Iterable[float]) -> str:
-    return "(" + ", ".join(f"{value:.4f}" for value in axis) + ")"

@@ -106,7 +106,7 @@ def new(
     out: str | Path | None = None,
     schema: str | Path | None = None,
 ) -> str:
-    """Return a commented file to edit: an array, a part, a column map, a twin, a scenario, a frame, a stage or a plan.
+    """Return a commented file to edit: an array, part, column map, twin, scenario, frame, stage, plan or brief.
 
     Parameters
     ----------

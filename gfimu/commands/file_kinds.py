@@ -22,6 +22,7 @@ FILE_KINDS = {
     "frame": "firmware_bridge.frames.format_file.FormatFile",
     "stage": "gfimu.uncertainty.stage.Stage",
     "plan": "sim.sweep.plan.PlanFile",
+    "brief": "gfimu.array_search.brief.BriefFile",
 }
 """Kinds of files by name, and the struct that is the schema of each."""
 
@@ -43,6 +44,7 @@ _MARKS = {
     "map": "channels",
     "scenario": "motion",
     "stage": "stage",
+    "brief": "volume",
     "twin": "array",
 }
 """A key by which each kind of file is known, the first kind that has it."""

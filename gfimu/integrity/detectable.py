@@ -36,7 +36,7 @@ from gfimu.integrity.policy import MonitorPolicy
 from gfimu.rate.sensing import ChannelTables, SensorErrors
 from gfimu.short_repr import short_repr
 
-__all__ = ["DetectableFaults", "detectable_faults"]
+__all__ = ["DetectableFaults", "detectable_faults", "least_fault"]
 
 _QUANTILE = 1.65  # standard normal, one-sided 95 %
 _EQUAL = 1e-6  # numerical: channels whose signatures differ by less than this share are one
@@ -134,3 +134,36 @@ def detectable_faults(
         tuple(array.channels), detected, isolated, rivals,
         np.linalg.norm(tables.alpha_rows[0], axis=0),
     )  # fmt: skip
+
+
+def least_fault(
+    n_channels: int,
+    noise_std: float,
+    sample_rate: float,
+    *,
+    duration: float = 1.0,
+    policy: MonitorPolicy | None = None,
+) -> float:
+    """Return the least fault that is detected on a channel that the others predict exactly, m/s².
+
+    With equal white noise on all channels and a known rate, (2) is this over √(1 − h_i), with h_i the leverage of
+    channel i, a diagonal element of J (JᵀJ)⁻¹ Jᵀ: |z_i|² = (1 − h_i)/σ² is all that an array changes.
+
+    Parameters
+    ----------
+    n_channels : int
+        Number of channels, which sets the threshold.
+    noise_std : float
+        White noise of every channel, m/s².
+    sample_rate : float
+        Samples per second, Hz.
+    duration : float
+        Time since the onset, s.
+    policy : MonitorPolicy, optional
+        Threshold and biases.
+    """
+    policy = policy or MonitorPolicy()
+    samples = max(1.0, duration * sample_rate)
+    bias = policy.bias_std**2 + 0.5 * policy.bias_walk * duration
+    threshold = policy.threshold(n_channels, policy.samples(1.0 / sample_rate) / sample_rate)
+    return float((np.sqrt(threshold) + _QUANTILE) * np.sqrt(noise_std**2 / samples + bias))

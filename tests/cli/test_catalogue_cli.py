@@ -5,6 +5,7 @@ import re
 import pytest
 
 from firmware_bridge.frames.format_file import load_format
+from gfimu.array_search.brief import load_brief
 from gfimu.commands.catalogue import KINDS, TEMPLATES
 from gfimu.files.model_files import find_model, list_models
 from gfimu.geometry.array import AccelerometerArray
@@ -25,6 +26,7 @@ LOADERS = {
     "frame": load_format,
     "stage": Stage.load,
     "plan": load_plan,
+    "brief": load_brief,
 }
 
 

@@ -47,6 +47,7 @@ NAMES_A_FILE = {
     "recording",
     "column_map",
     "plan",
+    "brief",
 }
 
 CALLS = {

@@ -123,7 +123,9 @@ def test_a_template_shows_every_key_of_the_schema(kind):
 
 
 def test_a_file_of_no_kind_is_refused():
-    with pytest.raises(InputError, match=r"x\.toml: is no array, part, plan, frame, map, scenario, stage, twin file"):
+    with pytest.raises(
+        InputError, match=r"x\.toml: is no array, part, plan, frame, map, scenario, stage, brief, twin file"
+    ):
         check_file({"colour": 1}, "x.toml")
     with pytest.raises(InputError, match=r"x\.toml: .*did you mean 'gravity_m_s2'\?"):
         check_file({"array": "cube12", "gravity_m_s": 9.8}, "x.toml")

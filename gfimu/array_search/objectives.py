@@ -1,0 +1,226 @@
+"""Objectives by name: figures of `gfimu score` and `gfimu drift` as criteria of a search."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gfimu.array_search.criteria import Criterion, FaultCriterion, Goal, KappaCriterion, Term, TraceCriterion
+from gfimu.array_search.problem import Problem
+from gfimu.bounds.sample import omega_products_jacobian
+from gfimu.errors import GeometryError, InputError, unknown_name
+from gfimu.integrity.detectable import least_fault
+from gfimu.parts.part import Part
+from gfimu.parts.part_file import PartFile
+from gfimu.position_drift import ErrorSources
+from gfimu.position_drift.weight import drift_weight
+
+__all__ = ["OBJECTIVES", "WORST", "Conditions", "Objective", "objective"]
+
+WORST = "_worst"
+"""Ending of the name of an objective that is judged by the worst draw of the tolerance."""
+
+_Vector = NDArray[np.float64]
+
+_UNSEEN_PRIOR = 1e-8  # numerical: information on the products of ω, so that those no channel sees do no harm
+_FEWEST_CHANNELS = {"gdop_joint": 9, "rate": 9, "fault": 7}  # six motions, and ω or a check besides
+_RATE_HZ = 100.0  # at which the data sheets state the noise
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """Under which noise, speed and time the objectives hold.
+
+    Parameters
+    ----------
+    part : str
+        Part of the chips, of which noise and bias are taken.
+    noise_m_s2 : float, optional
+        White noise of a channel per sample, m/s²; by default the part's at 100 Hz, root mean square of its axes.
+    bias_m_s2 : float, optional
+        Bias of a channel that drift counts, m/s²; by default what the part's data sheet says at switch-on.
+    speed_rad_s : float
+        Angular speed of the bound of the rate error, rad/s.
+    spin_axis : str
+        Body axis of that spin: x, y, z, or any: the mean square over the three.
+    time_s : float
+        Time after which drift counts, s.
+    fault_time_s : float
+        Time within which a fault of a channel is to be found, s.
+    sample_rate_hz : float
+        Of faults and of the noise of drift, Hz.
+    """
+
+    part: str = "adxl345"
+    noise_m_s2: float | None = None
+    bias_m_s2: float | None = None
+    speed_rad_s: float = math.tau
+    spin_axis: str = "z"
+    time_s: float = 30.0
+    fault_time_s: float = 1.0
+    sample_rate_hz: float = _RATE_HZ
+
+    def __post_init__(self) -> None:
+        for name in ("speed_rad_s", "time_s", "fault_time_s", "sample_rate_hz"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0):
+                raise InputError(f"{name} = {value!r}: must be a positive number")
+        if self.spin_axis not in {"x", "y", "z", "any"}:
+            raise InputError(f"unknown spin axis {self.spin_axis!r}; valid: x, y, z, any")
+
+    @property
+    def noise(self) -> float:
+        """White noise of a channel per sample, m/s²."""
+        if self.noise_m_s2 is not None:
+            return self.noise_m_s2
+        return float(np.sqrt(np.mean(Part.load(self.part).noise_std_100_hz ** 2)))
+
+    @property
+    def sources(self) -> ErrorSources:
+        """Errors of a channel that drift comes from."""
+        bias = self.bias_m_s2
+        if bias is None:
+            typical = PartFile.load(self.part, needs=("offset_std_m_s2",)).offset_std_m_s2
+            bias = float(np.sqrt(np.mean(np.square(np.asarray(typical, dtype=float)))))
+        return ErrorSources(bias=bias, noise_density=self.noise * math.sqrt(2.0 / self.sample_rate_hz))
+
+
+@dataclass(frozen=True)
+class Objective:
+    """A figure to be small.
+
+    Parameters
+    ----------
+    name : str
+        Its name, with `WORST` at the end where the worst draw counts.
+    meaning : str
+        What it is, in words.
+    unit : str
+        Its unit; empty for a pure number.
+    criterion : Criterion
+        Its logarithm as a function of a design.
+    """
+
+    name: str
+    meaning: str
+    unit: str
+    criterion: Criterion
+
+    @property
+    def is_worst(self) -> bool:
+        """Whether the worst draw of the tolerance counts."""
+        return self.name.endswith(WORST)
+
+    @property
+    def goal(self) -> Goal:
+        """The objective as what a search makes small."""
+        return Goal(((1.0, self.criterion, self.is_worst),))
+
+
+def objective(name: str, problem: Problem, conditions: Conditions) -> Objective:
+    """Return an objective by name.
+
+    Parameters
+    ----------
+    name : str
+        One of `OBJECTIVES`, or one of them with `WORST` at the end.
+    problem : Problem
+        What may be built: its unit of length and its number of channels.
+    conditions : Conditions
+        Noise, speed and times.
+
+    Raises
+    ------
+    InputError
+        If there is no such objective, or a worst case is asked for without a tolerance.
+    GeometryError
+        If so few channels can't have a finite figure.
+    """
+    plain = name.removesuffix(WORST)
+    if plain not in OBJECTIVES:
+        raise unknown_name("objective", name, OBJECTIVES)
+    if plain != name and problem.tolerance is None:
+        raise InputError(f"objective {name}: a worst case needs [tolerance] in the brief (or --position-tolerance-m)")
+    channels, fewest = problem.n_chips * problem.axes_per_chip, _FEWEST_CHANNELS.get(plain, 6)
+    if channels < fewest:
+        raise GeometryError(
+            f"objective {name}: {channels} channels; it is infinite for fewer than {fewest}: "
+            "use more chips or more axes"
+        )
+    meaning, unit, make = OBJECTIVES[plain]
+    worst = ", worst over the tolerances" if plain != name else ""
+    return Objective(name, meaning + worst, unit, make(problem, conditions))
+
+
+def _motion(problem: Problem, weight: _Vector) -> TraceCriterion:
+    """Root of tr(W C) with C the covariance of [α; p] in SI units for channels of unit variance."""
+    scale = np.array([1.0 / problem.unit] * 3 + [1.0] * 3)
+    return TraceCriterion((Term(np.eye(12)[:, :6], weight * np.outer(scale, scale), np.zeros(6)),))
+
+
+def _length(problem: Problem) -> float:
+    return problem.length_unit_m or problem.unit
+
+
+def _gdop(problem: Problem, conditions: Conditions) -> Criterion:
+    del conditions
+    return _motion(problem, np.diag([_length(problem) ** 2] * 3 + [1.0] * 3))
+
+
+def _gdop_joint(problem: Problem, conditions: Conditions) -> Criterion:
+    del conditions
+    weight = np.diag([(_length(problem) / problem.unit) ** 2] * 3 + [1.0] * 3 + [0.0] * 6)
+    return TraceCriterion((Term(np.eye(12), weight, np.array([0.0] * 6 + [_UNSEEN_PRIOR] * 6)),))
+
+
+def _kappa(problem: Problem, conditions: Conditions) -> Criterion:
+    del conditions
+    return KappaCriterion(problem.unit / _length(problem))
+
+
+def _sigma_alpha(problem: Problem, conditions: Conditions) -> Criterion:
+    return _motion(problem, conditions.noise**2 * np.diag([1.0] * 3 + [0.0] * 3) / 3.0)
+
+
+def _sigma_p(problem: Problem, conditions: Conditions) -> Criterion:
+    return _motion(problem, conditions.noise**2 * np.diag([0.0] * 3 + [1.0] * 3) / 3.0)
+
+
+def _rate(problem: Problem, conditions: Conditions) -> Criterion:
+    spins = np.eye(3) if conditions.spin_axis == "any" else np.eye(3)["xyz".index(conditions.spin_axis)][None]
+    scale = (conditions.noise / (problem.unit * conditions.speed_rad_s)) ** 2
+    terms = []
+    for spin in spins:
+        into = np.zeros((12, 9))
+        into[:6, :6] = np.eye(6)
+        into[6:, 6:] = omega_products_jacobian(spin)
+        terms.append(Term(into, np.diag([0.0] * 6 + [scale / (3.0 * len(spins))] * 3), np.zeros(9)))
+    return TraceCriterion(tuple(terms))
+
+
+def _drift(problem: Problem, conditions: Conditions) -> Criterion:
+    return _motion(problem, drift_weight(conditions.time_s, conditions.sources))
+
+
+def _fault(problem: Problem, conditions: Conditions) -> Criterion:
+    channels = problem.n_chips * problem.axes_per_chip
+    return FaultCriterion(
+        least_fault(channels, conditions.noise, conditions.sample_rate_hz, duration=conditions.fault_time_s)
+    )
+
+
+OBJECTIVES: dict[str, tuple[str, str, Callable[[Problem, Conditions], Criterion]]] = {
+    "gdop": ("GDOP", "", _gdop),
+    "gdop_joint": ("GDOP*, the angular rate unknown", "", _gdop_joint),
+    "kappa": ("condition number κ(J)", "", _kappa),
+    "sigma_alpha": ("σ of α, root mean square of its components", "rad/s²", _sigma_alpha),
+    "sigma_p": ("σ of p, root mean square of its components", "m/s²", _sigma_p),
+    "rate": ("bound of the rate error, root mean square of its components", "rad/s", _rate),
+    "drift": ("position drift of first order at rest", "m", _drift),
+    "fault": ("least fault of the worst channel that is seen", "m/s²", _fault),
+}
+"""Objectives: meaning, unit and how each becomes a criterion."""

@@ -1,0 +1,344 @@
+"""Search of accelerometer arrays: exchange from random starts, each polished, with a proven lower bound.
+
+A start is a random design. An exchange over candidate places and directions takes it to a design that no single
+exchange makes better; the polish moves it on where places or directions are continuous. Then single chips are put
+elsewhere at random and the same is done again, and what is better is kept. Starts are independent: how many
+of them agree says how sure it is that nothing better exists, where the certificate does not.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gfimu.array_search.certificate import Certificate, certify
+from gfimu.array_search.criteria import Goal
+from gfimu.array_search.exchange import exchange, figure
+from gfimu.array_search.objectives import Conditions, Objective, objective
+from gfimu.array_search.polish import feasible, leakage_of, polish
+from gfimu.array_search.problem import Design, Problem
+from gfimu.array_search.shapes import box
+from gfimu.errors import GeometryError, InputError
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.geometry.dilution import gdop_lower_bound
+from gfimu.geometry.kinematics import require_all_motions
+from gfimu.geometry.scoring import Score, score
+from gfimu.short_repr import short_repr
+
+__all__ = ["Found", "SearchResult", "best_design", "optimize", "search"]
+
+_Vector = NDArray[np.float64]
+
+_KICKS = 4  # times that one chip of a start is put elsewhere; more find more and cost as much each
+_MORE_KICKS = 5  # times as many where nothing is polished, so that they cost little
+_MANY_CHIPS = 24  # from which on a polish costs so much that no chip is put elsewhere
+_WORTH_A_POLISH = 0.01  # relative: an exchange that ends this much above the start's best is polished no more
+_ENOUGH = 10  # starts that agree, after which no more are made
+_NEAR = 1e-3  # relative: starts that end this near the best are counted besides
+_UNSEEN = 1e-4  # singular value of J, lengths in units, below which a motion counts as not seen
+_DIGITS = 6  # of positions in units, where rounding costs nothing
+
+
+@dataclass(frozen=True)
+class SearchResult:
+    """Best array found.
+
+    Parameters
+    ----------
+    array : AccelerometerArray
+        The array; ``array.to_toml()`` is an array file.
+    score : Score
+        Its figures of merit in its length unit, half the longest edge of the volume.
+    gdop_lower_bound : float
+        GDOP that no geometry of as many tri-axial chips in the cube around a box can beat; NaN for other searches.
+    starts : int
+        How many starts were made.
+    agreeing : int
+        How many of them ended at the best figure: trust the result less if it is one of many.
+    near : int
+        How many ended within 0.1 % of it.
+    objective : Objective
+        What was made small.
+    value : float
+        Its figure.
+    certificate : Certificate or None
+        A proven lower bound of it.
+    """
+
+    array: AccelerometerArray
+    score: Score
+    gdop_lower_bound: float
+    starts: int
+    agreeing: int
+    near: int
+    objective: Objective
+    value: float
+    certificate: Certificate | None
+
+    __repr__ = short_repr
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the content of ``gfimu optimize --json``."""
+        return {
+            "array": self.array.to_dict(),
+            "score": self.score.to_dict(),
+            "gdop_lower_bound": self.gdop_lower_bound,
+            "starts": self.starts,
+            "agreeing": self.agreeing,
+            "within_0_1_percent": self.near,
+            "objective": {
+                "name": self.objective.name,
+                "meaning": self.objective.meaning,
+                "unit": self.objective.unit,
+                "value": self.value,
+            },
+            "certificate": None if self.certificate is None else self.certificate.to_dict(),
+        }
+
+
+def optimize(
+    n_chips: int,
+    *,
+    rng: np.random.Generator,
+    axes_per_chip: int = 3,
+    box_m: ArrayLike = (0.1, 0.1, 0.1),
+    min_spacing_m: float = 0.005,
+    non_recursive: bool = False,
+    restarts: int = 40,
+    part: str = "adxl345",
+    report: Callable[[int], None] | None = None,
+) -> SearchResult:
+    """Search the array of least GDOP inside a box centred at the body origin.
+
+    Parameters
+    ----------
+    n_chips : int
+        Number of chips.
+    rng : numpy.random.Generator
+        Source of the random starts.
+    axes_per_chip : int
+        Sensing axes of a chip: 1, 2 or 3.
+    box_m : array_like, shape (3,)
+        Edges of the box along body x, y, z, m; zero makes it flat.
+    min_spacing_m : float
+        Least distance between two chips, m.
+    non_recursive : bool
+        Accept only arrays whose α = (S a)₁…₃ is free of ω².
+    restarts : int
+        Most starts that are made.
+    part : str
+        Part of the chips in the result.
+    report : callable, optional
+        Called with the number of starts done.
+
+    Raises
+    ------
+    GeometryError
+        If no array of these chips in this box sees all six motions, or none is free of ω² where that is asked.
+    InputError
+        If an argument is out of range or the chips don't fit at that spacing.
+    """
+    problem = Problem(n_chips, axes_per_chip, box(box_m), (), min_spacing_m, non_recursive=non_recursive)
+    conditions = Conditions(part=part)
+    return search(problem, objective("gdop", problem, conditions), rng, starts=restarts, part=part, report=report)
+
+
+def search(
+    problem: Problem,
+    wanted: Objective,
+    rng: np.random.Generator,
+    *,
+    starts: int = 40,
+    part: str = "adxl345",
+    name: str = "",
+    report: Callable[[int], None] | None = None,
+) -> SearchResult:
+    """Search the array for which an objective is least.
+
+    Parameters
+    ----------
+    problem : Problem
+        What may be built.
+    wanted : Objective
+        What is to be small.
+    rng : numpy.random.Generator
+        Source of the random starts.
+    starts : int
+        Most starts that are made; fewer once ten agree.
+    part : str
+        Part of the chips in the result.
+    name : str
+        Name of the result.
+    report : callable, optional
+        Called with the number of starts done.
+
+    Raises
+    ------
+    GeometryError
+        If no array of these chips sees all six motions, or none is free of ω² where that is asked.
+    InputError
+        If an argument is out of range or the chips don't fit.
+    """
+    judged = problem if wanted.is_worst or problem.tolerance is None else replace(problem, tolerance=None)
+    found = best_design(judged, wanted.goal, rng, starts=starts, report=report)
+    n, k = problem.n_chips, problem.axes_per_chip
+    condition = f"least {wanted.meaning} found" + (" with α free of ω²" if problem.non_recursive else "")
+    description = f"{condition} for {n} chips of {k} axes in {problem.volume.name}"
+    array = problem.array(found.design, name or f"optimized_{n}x{k}", part, description)
+    value = math.exp(figure(judged, wanted.goal, found.design))
+    figures = score(array)[0]
+    if wanted.name.startswith("gdop_joint") and not math.isfinite(figures.gdop_joint):
+        raise GeometryError(
+            f"no geometry of {n} such chips in {problem.volume.name} was found that separates α and p from the "
+            "products of ω; use more chips or more axes"
+        )
+    if wanted.name == "gdop_joint":
+        value = figures.gdop_joint  # without the prior on products of ω that no channel sees
+    in_box = wanted.name == "gdop" and k == 3 and problem.volume.name.startswith("a box") and _centred(problem)
+    return SearchResult(
+        array=array,
+        score=figures,
+        gdop_lower_bound=gdop_lower_bound(n) if in_box else math.nan,
+        starts=found.starts,
+        agreeing=found.agreeing,
+        near=found.near,
+        objective=wanted,
+        value=value,
+        certificate=certify(judged, wanted.criterion, value),
+    )
+
+
+@dataclass(frozen=True)
+class Found:
+    """Best design of a number of starts.
+
+    Parameters
+    ----------
+    design : Design
+        The design.
+    starts, agreeing, near : int
+        Starts made; how many ended at its figure; how many within 0.1 % of it.
+    """
+
+    design: Design
+    starts: int
+    agreeing: int
+    near: int
+
+
+def best_design(
+    problem: Problem,
+    goal: Goal,
+    rng: np.random.Generator,
+    *,
+    starts: int,
+    kicks: int = _KICKS,
+    also: tuple[Design, ...] = (),
+    report: Callable[[int], None] | None = None,
+) -> Found:
+    """Return the best design of a number of starts.
+
+    ``also`` are designs to begin from besides the random ones; ``kicks`` is how often one chip of a start is put
+    elsewhere. Raises as `search`.
+    """
+    if starts < 1:
+        raise InputError(f"restarts = {starts}: must be at least 1")
+    if problem.shape is None and not problem.turns:
+        kicks *= _MORE_KICKS
+    elif problem.n_chips > _MANY_CHIPS:
+        kicks = 0
+    ends: list[tuple[float, Design]] = []
+    made = 0
+    for number in range(starts + len(also)):
+        given = also[number] if number < len(also) else None
+        value, design = _one_start(problem, goal, given, rng, kicks)
+        made += 1
+        if feasible(problem, design) and not (problem.non_recursive and leakage_of(design)):
+            ends.append((value, design))
+        if report is not None:
+            report(made)
+        best = min((one for one, _ in ends), default=math.inf)
+        if sum(one < best + goal.agreement for one, _ in ends) >= _ENOUGH:
+            break
+    if not ends:
+        raise _failure(problem, None)
+    best, design = min(ends, key=lambda item: item[0])
+    if _sees_too_little(design):
+        raise _failure(problem, design)
+    agreeing, near = (sum(one < best + alike for one, _ in ends) for alike in (goal.agreement, _NEAR))
+    return Found(_rounded(problem, goal, design, best), made, agreeing, near)
+
+
+def _one_start(
+    problem: Problem, goal: Goal, given: Design | None, rng: np.random.Generator, kicks: int
+) -> tuple[float, Design]:
+    pool = problem.candidates(rng)
+    begin = problem.random_design(pool, rng) if given is None else given
+    design, value = exchange(problem, goal, pool, begin, rng)
+    design = polish(problem, goal, design)
+    value = figure(problem, goal, design)
+    for _ in range(0 if problem.non_recursive else kicks):
+        pool = problem.candidates(rng)
+        trial, reached = exchange(problem, goal, pool, _kicked(problem, pool, design, rng), rng)
+        if reached < value + _WORTH_A_POLISH:
+            trial = polish(problem, goal, trial)
+            reached = figure(problem, goal, trial)
+            if reached < value and feasible(problem, trial):
+                design, value = trial, reached
+    return value, design
+
+
+def _kicked(problem: Problem, pool: Any, design: Design, rng: np.random.Generator) -> Design:
+    """Return the design with one chip at a random candidate."""
+    chip = int(rng.integers(problem.n_chips))
+    others = np.arange(problem.n_chips) != chip
+    free = np.flatnonzero(problem.apart(pool, design.positions[others], design.site[others]))
+    if not len(free):
+        return design
+    one = int(rng.choice(free))
+    return design.with_chip(chip, pool.positions[one], pool.axes[one], int(pool.site[one]))
+
+
+def _rounded(problem: Problem, goal: Goal, design: Design, value: float) -> Design:
+    """Positions without the optimiser's last digits, where that costs nothing."""
+    if problem.shape is None:
+        return design
+    positions = np.round(design.positions, _DIGITS) + 0.0
+    low, high = problem.shape.centre - problem.shape.half, problem.shape.centre + problem.shape.half
+    tidy = Design(np.clip(positions, low, high), design.axes, design.site)
+    costs_nothing = figure(problem, goal, tidy) <= value + 1e-6
+    clean = not (problem.non_recursive and leakage_of(tidy))
+    return tidy if costs_nothing and clean and feasible(problem, tidy) else design
+
+
+def _sees_too_little(design: Design) -> bool:
+    return bool(np.linalg.svd(design.rows[:, :6], compute_uv=False)[-1] < _UNSEEN)
+
+
+def _centred(problem: Problem) -> bool:
+    return problem.shape is not None and not problem.shape.centre.any()
+
+
+def _failure(problem: Problem, design: Design | None) -> GeometryError:
+    """Build the error that says why no start ended well."""
+    where = problem.volume.name
+    if design is None:
+        rng = np.random.default_rng(0)
+        design = problem.random_design(problem.candidates(rng), rng)
+    try:
+        require_all_motions(problem.array(design, "of such chips", "adxl345", ""))
+    except GeometryError as error:
+        return GeometryError(f"no geometry of {problem.n_chips} such chips in {where} sees all motions: {error}")
+    if problem.non_recursive:
+        return GeometryError(
+            f"no geometry of {problem.n_chips} such chips in {where} was found whose angular acceleration is free "
+            "of ω²; use more chips, or leave out the condition and give ω to the estimator"
+        )
+    return GeometryError(
+        f"no geometry of {problem.n_chips} such chips in {where} was found that sees all motions well; use more chips"
+    )
