@@ -90,19 +90,20 @@ def plot(
 
 
 def print_groups(title: str, groups: Sequence[Group]) -> None:
-    """Print the quantiles of results."""
+    """Print the quantiles of each result in a table of its own."""
+    print_text(title)
     factors = list(groups[0].values) if groups else []
-    rows = [
-        (
-            *(str(group.values[name]) for name in factors),
-            group.result,
-            str(group.cases),
-            f"{group.median:.4g}",
-            f"{group.low:.4g} … {group.high:.4g}",
-        )
-        for group in groups
-    ]
-    print_table(title, (*factors, "result", "cases", "median or share", "5 … 95 %"), rows, left=len(factors) + 1)
+    for result in dict.fromkeys(group.result for group in groups):
+        rows = [
+            (
+                *(str(group.values[name]) for name in factors),
+                str(group.cases),
+                *(f"{value:.4g}" for value in (group.low, group.median, group.high)),
+            )
+            for group in groups
+            if group.result == result
+        ]
+        print_table(result, (*factors, "cases", "5 %", "median or share", "95 %"), rows, left=len(factors))
 
 
 def print_failures(failures: dict[str, int]) -> None:
