@@ -6,16 +6,19 @@ import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Iterator
-from concurrent.futures import BrokenExecutor, ProcessPoolExecutor
+from collections.abc import Callable, Iterator
+from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from multiprocessing.connection import Connection
 from multiprocessing.queues import SimpleQueue
+from typing import Any, TypeVar
 
 from gfimu.errors import GfimuError
 from sim.sweep.engine import Workers
 
 __all__ = ["open_pool"]
+
+T = TypeVar("T")
 
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
@@ -39,7 +42,7 @@ def open_pool(count: int) -> Iterator[Workers]:
         watched,
         kept,
         _one_thread(),
-        ProcessPoolExecutor(count, context, initializer=_begin, initargs=(watched, shares)) as pool,
+        _Pool(count, context, initializer=_begin, initargs=(watched, shares)) as pool,
     ):
         try:
             pool.submit(_ready).result()
@@ -53,6 +56,22 @@ def open_pool(count: int) -> Iterator[Workers]:
             kept.close()
             pool.shutdown(cancel_futures=True)
             raise
+
+
+class _Pool(ProcessPoolExecutor):
+    """A pool whose workers leave Ctrl-C, which a terminal sends to every process, to the campaign from the start.
+
+    Workers start under `submit`, and a process begins with the blocked signals of the thread that starts it.
+    """
+
+    def submit(self, fn: Callable[..., T], /, *args: Any, **kwargs: Any) -> Future[T]:
+        if not hasattr(signal, "pthread_sigmask"):
+            return super().submit(fn, *args, **kwargs)
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            return super().submit(fn, *args, **kwargs)
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 @contextmanager
@@ -81,7 +100,7 @@ def _shares(workers: int) -> list[set[int]]:
 
 
 def _begin(watched: Connection, shares: SimpleQueue[set[int]]) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C in a terminal reaches all processes; the campaign ends them
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # where `_Pool` can't block it: the campaign ends its workers
     share = shares.get()
     if share:
         os.sched_setaffinity(0, share)

@@ -106,7 +106,7 @@ def test_table_has_quantiles_and_sensitivities(gfimu_command, campaign, tmp_path
     text = gfimu_command("campaign", "table", campaign, "--by", "bias_instability_mg").stdout
     assert "given data" in text
     assert "0.1" in text
-    assert text.count("…") > 30  # five parts of the range, of six results each
+    assert text.count("…") == 30  # five parts of the range, of six results each
 
 
 def test_plot_draws_every_kind_of_file(gfimu_command, campaign, tmp_path):
@@ -192,7 +192,11 @@ def test_ctrl_c_ends_the_workers_at_once_and_what_is_there_stays(tmp_path):
     (tmp_path / "go.py").write_text(code)
     words = ["campaign", tmp_path / "plan.toml", "--out", tmp_path / "out", "--workers", "2"]
     started = subprocess.Popen(
-        [sys.executable, tmp_path / "go.py", *words], stderr=subprocess.PIPE, text=True, start_new_session=True
+        [sys.executable, tmp_path / "go.py", *words],
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a job in the background ignores it
     )
     until = time.monotonic() + 60.0
     while not list((tmp_path / "out").glob("[0-9]*.parquet")) and time.monotonic() < until:

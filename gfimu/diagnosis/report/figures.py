@@ -52,7 +52,6 @@ _NOISE, _INK, _PALE = css(NOISE_ON_PAPER), css(INK), css(PALE)
 _STRONGEST = 4  # channels drawn in colour
 _MOST_POINTS = 4000
 _MOST_FREQUENCIES = 1200
-_SVG_DPI = 72  # points per inch, in which SVG is laid out
 _DPI = 110
 _SMOOTH_S = 0.15
 _STYLE = {
@@ -295,7 +294,7 @@ def _svg(figure: Figure) -> str:
     buffer = io.StringIO()
     if layout := figure.get_layout_engine():  # laid out here, as a figure that is saved with a layout is drawn twice
         FigureCanvasSVG(figure)
-        figure.set_dpi(_SVG_DPI)
+        figure.set_dpi(72)  # points per inch, in which SVG is laid out
         layout.execute(figure)
         figure.set_layout_engine(None)
     figure.savefig(buffer, format="svg", dpi=_DPI, metadata={"Date": None})

@@ -270,7 +270,7 @@ def test_table_in_the_docs_is_what_the_code_computes(project_root):
     rows = [
         [cell.strip() for cell in line.strip("| \n").split("|")]
         for line in (project_root / "docs" / "geometry.md").read_text(encoding="utf-8").splitlines()
-        if line.startswith("| `")
+        if line.startswith("| `") and line.count("|") == 8  # other tables of the page are narrower
     ]
     assert {row[0].strip("`") for row in rows} == set(seeing_arrays())
     for name, channels, condition, dilution, joint, left, seen in rows:
