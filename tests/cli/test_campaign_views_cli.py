@@ -188,15 +188,17 @@ def ends(group, within):
 def test_ctrl_c_ends_the_workers_at_once_and_what_is_there_stays(tmp_path):
     """A process of its own: the signal goes to the group, as from a terminal."""
     (tmp_path / "plan.toml").write_text(PLAN.replace("points = 32", "points = 65536"))
-    code = "if __name__ == '__main__':\n    from gfimu.cli import main\n    main()\n"
+    code = """
+if __name__ == "__main__":
+    import signal
+    from gfimu.cli import main
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # which a job in the background ignores
+    main()
+"""
     (tmp_path / "go.py").write_text(code)
     words = ["campaign", tmp_path / "plan.toml", "--out", tmp_path / "out", "--workers", "2"]
     started = subprocess.Popen(
-        [sys.executable, tmp_path / "go.py", *words],
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a job in the background ignores it
+        [sys.executable, tmp_path / "go.py", *words], stderr=subprocess.PIPE, text=True, start_new_session=True
     )
     until = time.monotonic() + 60.0
     while not list((tmp_path / "out").glob("[0-9]*.parquet")) and time.monotonic() < until:
