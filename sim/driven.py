@@ -239,7 +239,7 @@ def drive_all(
             continue
         groups.setdefault((len(run.times), *_layout(model)), []).append((place, model))
     total, done = sum(len(run.times) for run in runs), 0.0
-    tell = progress or (lambda share: None)
+    report = progress or (lambda share: None)
     for (steps, *_), group in groups.items():
         places, models = [place for place, _ in group], [model for _, model in group]
         part = len(group) * steps / total
@@ -249,7 +249,7 @@ def drive_all(
                 models,
                 threads,
                 every,
-                lambda share, part=part, done=done: tell(done + part * share),  # type: ignore[misc]
+                lambda share, part=part, done=done: report(done + part * share),  # type: ignore[misc]
             )
         for place, result in zip(places, found, strict=True):
             results[place] = result
@@ -279,7 +279,7 @@ def _step_together(
     models: Sequence[mujoco.MjModel],
     threads: int,
     every: int,
-    tell: Callable[[float], None],
+    report: Callable[[float], None],
 ) -> list[DrivenRun | InputError]:
     """Step runs of one layout and length; return a result for each."""
     times = [run.times for run in drives]
@@ -306,7 +306,7 @@ def _step_together(
             stopped[error.ids] = True  # the others ran to the end
         kept = sensors[:, ::every]
         logs[:, first // every : first // every + kept.shape[1]] = kept
-        tell((first + count) / steps)
+        report((first + count) / steps)
     failed = stopped | (batch.warning[:, :, 1] != warned).any(axis=1)
     return [
         InputError(

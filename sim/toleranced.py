@@ -26,15 +26,26 @@ from sim.scenarios import Scenario
 from sim.truth import cube_state
 from sim.turntable import prescribed_readings
 
-__all__ = ["CALIBRATED_AT", "LEAST_TIME_S", "ToleranceUnit", "draw_unit", "known_motion_of", "reference_motion"]
+__all__ = [
+    "CALIBRATED_AT",
+    "LEAST_TIME_S",
+    "REST_S",
+    "ToleranceUnit",
+    "draw_unit",
+    "known_motion_of",
+    "reference_motion",
+]
 
 Floats = NDArray[np.float64]
 
 CALIBRATED_AT = 25.0
 """Temperature of the data sheets' figures and of a calibration, °C."""
 
-_REST_S, _RAMP_S = 1.5, 0.5
-LEAST_TIME_S = _REST_S + _RAMP_S
+REST_S = 1.5
+"""Rest at the start of the reference motion, s."""
+
+_RAMP_S = 0.5
+LEAST_TIME_S = REST_S + _RAMP_S
 """Shortest reference motion: its rest and its ramp, s."""
 
 
@@ -132,7 +143,7 @@ def reference_motion(array: AccelerometerArray, *, time: float, rate: float, sam
     sample_rate : float
         Sample rate, Hz.
     """
-    pieces: list[Segment] = [Hold(_REST_S), Ramp(rate, _RAMP_S), Hold(time - LEAST_TIME_S)]
+    pieces: list[Segment] = [Hold(REST_S), Ramp(rate, _RAMP_S), Hold(time - LEAST_TIME_S)]
     return Scenario("reference motion", array, spin_profile(pieces), time, sample_rate, cube_offset=(0.0, 0.0, 0.0))
 
 

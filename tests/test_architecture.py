@@ -298,6 +298,7 @@ ROOMS = {
         "gfimu.visual.colours",
     },
     "gfimu.tolerances": {
+        "gfimu.bounds.sample",
         "gfimu.calibration",
         "gfimu.geometry",
         "gfimu.motion",

@@ -103,7 +103,7 @@ class ObjectiveTable(Table, frozen=True):
         about("Length that counts as 1 in GDOP and κ.", "m", default="half the longest edge around the volume"),
     ] = None
     noise_m_s2: Annotated[
-        Positive | None, about("White noise of a channel per sample.", "m/s²", default="the part's at 100 Hz")
+        Positive | None, about("White noise of a channel per sample.", "m/s²", default="the part's at sample_rate_hz")
     ] = None
     bias_m_s2: Annotated[
         NotNegative | None, about("Bias of a channel, for drift.", "m/s²", default="the part's at switch-on")
@@ -112,11 +112,11 @@ class ObjectiveTable(Table, frozen=True):
     spin_axis: Annotated[Literal["x", "y", "z", "any"], about("Body axis of that spin; any: the three alike.")] = "z"
     time_s: Annotated[Positive, about("Time after which drift counts.", "s")] = 30.0
     fault_time_s: Annotated[Positive, about("Time within which a fault of a channel is to be found.", "s")] = 1.0
-    sample_rate_hz: Annotated[Positive, about("Sample rate, for faults and drift.", "Hz")] = 100.0
+    sample_rate_hz: Annotated[Positive, about("Sample rate, for noise, faults and drift.", "Hz")] = 100.0
 
 
 class ToleranceTable(Table, frozen=True):
-    """Machining and mounting: each chip is off by up to this, evenly distributed."""
+    """Machining and mounting: each chip is off by up to this, uniformly distributed."""
 
     position_m: Annotated[NotNegative, about("Of each coordinate of each chip.", "m")] = 0.0
     angle_rad: Annotated[NotNegative, about("Of the turn of each chip about each body axis.", "rad")] = 0.0

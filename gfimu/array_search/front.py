@@ -1,9 +1,9 @@
-"""The arrays that are best in two respects: each can be improved in one only at the cost of the other.
+"""Pareto front of two objectives: arrays that can be improved in one only at the cost of the other.
 
 Two objectives are weighed against each other: the sum of w log f + (1 − w) log g is made small for several w, each
 search beginning from the last one's array besides its random starts, and what another array beats in both is dropped.
-Arrays in a concave stretch of the front (in logarithms) are not found that way. With ``chips`` or ``size`` as one
-respect, the other is made small for each number of chips, or for the volume shrunk in steps.
+Arrays in a concave stretch of the front (in logarithms) are not found that way. Where one objective is ``chips`` or
+``size``, the other is made small for each number of chips, or for the volume shrunk in steps.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ from gfimu.short_repr import short_repr
 __all__ = ["CHIPS", "SIZE", "Front", "FrontPoint", "find_front"]
 
 CHIPS, SIZE = "chips", "size"
-"""Respects that are no objectives: the number of chips, and the longest edge around the volume."""
+"""Objectives of a front alone: the number of chips, and the longest edge around the volume."""
 
 _WEIGHTS = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 _SIZES = (1.0, 0.85, 0.7, 0.6, 0.5, 0.4, 0.3)  # of the volume of the brief
 _KICKS = 1  # of each start: neighbours on the front are starts besides
-_TIE = 1e-6  # of the figure of the other respect at the ends of the front, where it would be left to chance
+_TIE = 1e-6  # of the figure of the other objective at the ends of the front, where it would be left to chance
 _ALIKE = 1e-4  # relative: points nearer than this in both figures are one
 
 
@@ -64,12 +64,12 @@ class FrontPoint:
 
 @dataclass(frozen=True)
 class Front:
-    """Arrays none of which is worse than another in both respects, by the first of them.
+    """Arrays none of which is worse than another in both objectives, by the first of them.
 
     Parameters
     ----------
     names, meanings, units : tuple of str
-        The two respects.
+        The two objectives.
     points : tuple of FrontPoint
         The arrays.
     """
@@ -84,7 +84,7 @@ class Front:
     def to_dict(self) -> dict[str, Any]:
         """Return the content of ``front.json``."""
         return {
-            "respects": [
+            "objectives": [
                 {"name": name, "meaning": meaning, "unit": unit}
                 for name, meaning, unit in zip(self.names, self.meanings, self.units, strict=True)
             ],
@@ -112,20 +112,20 @@ def find_front(
     starts: int = 40,
     report: Callable[[float], None] | None = None,
 ) -> Front:
-    """Search the front of two respects.
+    """Search the front of two objectives.
 
     Parameters
     ----------
     problem : Problem
-        What may be built; its number of chips is the least where chips are a respect.
+        What may be built; its number of chips is the least where `CHIPS` is an objective.
     conditions : Conditions
         Noise, speed and times of the objectives.
     names : tuple of str
-        Two objectives, or one and `CHIPS` or `SIZE`.
+        Two keys of `OBJECTIVES`, or one and `CHIPS` or `SIZE`.
     rng : numpy.random.Generator
         Source of the random starts.
     most_chips : int
-        Where chips are a respect, the largest number of them.
+        Where `CHIPS` is an objective, the largest number of them.
     starts : int
         Most random starts of each array.
     report : callable, optional
@@ -134,7 +134,7 @@ def find_front(
     Raises
     ------
     InputError
-        If the two are the same, none is an objective, or one is unknown.
+        If the two are the same, neither is a key of `OBJECTIVES`, or one is unknown.
     GeometryError
         If no array sees all six motions.
     """
@@ -236,10 +236,13 @@ def _sizes(problem: Problem) -> list[tuple[float, Problem]]:
             "a front over size shrinks the volume; candidate sites have none, give a box, sphere or cylinder"
         )
     unit = problem.length_unit_m or problem.unit  # one unit for all sizes, or the figures could not be compared
-    return [
-        (2.0 * problem.unit * share, replace(problem, volume=problem.volume.scaled(share), length_unit_m=unit))
-        for share in _SIZES
-    ]
+    steps = []
+    for share in _SIZES:
+        shrunk = problem.volume.scaled(share)
+        if share < 1.0:
+            shrunk = replace(shrunk, name=f"{shrunk.name} with all lengths times {share:g}")
+        steps.append((2.0 * problem.unit * share, replace(problem, volume=shrunk, length_unit_m=unit)))
+    return steps
 
 
 def _bound(problem: Problem, wanted: Objective, value: float) -> float | None:

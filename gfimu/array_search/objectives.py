@@ -28,7 +28,6 @@ _Vector = NDArray[np.float64]
 
 _UNSEEN_PRIOR = 1e-8  # numerical: information on the products of ω, so that those no channel sees do no harm
 _FEWEST_CHANNELS = {"gdop_joint": 9, "rate": 9, "fault": 7}  # six motions, and ω or a check besides
-_RATE_HZ = 100.0  # at which the data sheets state the noise
 
 
 @dataclass(frozen=True)
@@ -40,7 +39,8 @@ class Conditions:
     part : str
         Part of the chips, of which noise and bias are taken.
     noise_m_s2 : float, optional
-        White noise of a channel per sample, m/s²; by default the part's at 100 Hz, root mean square of its axes.
+        White noise of a channel per sample, m/s²; by default the part's at the sample rate, root mean square of its
+        axes.
     bias_m_s2 : float, optional
         Bias of a channel that drift counts, m/s²; by default what the part's data sheet says at switch-on.
     speed_rad_s : float
@@ -52,7 +52,7 @@ class Conditions:
     fault_time_s : float
         Time within which a fault of a channel is to be found, s.
     sample_rate_hz : float
-        Of faults and of the noise of drift, Hz.
+        Sample rate, Hz: of the noise per sample, of faults and of drift.
     """
 
     part: str = "adxl345"
@@ -62,7 +62,7 @@ class Conditions:
     spin_axis: str = "z"
     time_s: float = 30.0
     fault_time_s: float = 1.0
-    sample_rate_hz: float = _RATE_HZ
+    sample_rate_hz: float = 100.0
 
     def __post_init__(self) -> None:
         for name in ("speed_rad_s", "time_s", "fault_time_s", "sample_rate_hz"):
@@ -77,7 +77,7 @@ class Conditions:
         """White noise of a channel per sample, m/s²."""
         if self.noise_m_s2 is not None:
             return self.noise_m_s2
-        return float(np.sqrt(np.mean(Part.load(self.part).noise_std_100_hz ** 2)))
+        return float(np.sqrt(np.mean(Part.load(self.part).noise_std(self.sample_rate_hz) ** 2)))
 
     @property
     def sources(self) -> ErrorSources:
@@ -144,7 +144,7 @@ def objective(name: str, problem: Problem, conditions: Conditions) -> Objective:
     if plain not in OBJECTIVES:
         raise unknown_name("objective", name, OBJECTIVES)
     if plain != name and problem.tolerance is None:
-        raise InputError(f"objective {name}: a worst case needs [tolerance] in the brief (or --position-tolerance-m)")
+        raise InputError(f"objective {name}: a worst case needs [tolerance] in the brief")
     channels, fewest = problem.n_chips * problem.axes_per_chip, _FEWEST_CHANNELS.get(plain, 6)
     if channels < fewest:
         raise GeometryError(

@@ -1,4 +1,4 @@
-"""Pictures of a search: the array in its volume, and the front of two respects."""
+"""Pictures of a search: the array in its volume, and the front of two objectives."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ def _axes(problem: Problem) -> str:
 def _wires(shape: Shape) -> list[NDArray[np.float64]]:
     """Lines that show a shape, each of shape (p, 3), m."""
     centre, half, turn = shape.centre, shape.half, np.linspace(0.0, 2.0 * np.pi, 73)
-    if shape.name.startswith("a box"):
+    if shape.kind == "box":
         corners = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)])
         return [
             centre + np.array([one, other]) * half
@@ -117,7 +117,7 @@ def _wires(shape: Shape) -> list[NDArray[np.float64]]:
             if np.abs(one - other).sum() == 2
         ]
     ring = np.column_stack([np.cos(turn), np.sin(turn), np.zeros_like(turn)])
-    if shape.name.startswith("a sphere"):
+    if shape.kind == "sphere":
         return [centre + np.roll(ring, shift, axis=1) * half for shift in range(3)]
     along = int(np.argmax(np.abs(shape.linear).sum(axis=0)))
     flat = np.roll(ring, along - 2, axis=1)
@@ -132,7 +132,7 @@ def _draw_zone(
     """Draw a zone as far as it is within the limits that are shown, mm."""
     from scipy.spatial import ConvexHull
 
-    round_one = zone.name.startswith("a sphere")
+    round_one = zone.kind == "sphere"
     points = np.clip((zone.sample(400, np.random.default_rng(0)) if round_one else zone.outer_points) * _MM, *shown)
     if np.linalg.matrix_rank(points - points[0]) == 3:
         style: dict[str, Any] = {"color": css(BEFORE_ON_PAPER), "alpha": 0.18, "linewidth": 0.0}

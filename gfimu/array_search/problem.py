@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -157,7 +157,6 @@ class Problem:
     non_recursive: bool = False
     tolerance: Tolerance | None = None
     length_unit_m: float | None = None
-    _places: _Vector = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         n, k = self.n_chips, self.axes_per_chip
@@ -170,24 +169,23 @@ class Problem:
                 f"{n} chips with {k} axes have {n * k} channels; "
                 f"six motions need six or more: use at least {math.ceil(6 / k)} chips"
             )
-        places = self.volume.positions if isinstance(self.volume, Sites) else np.empty((0, 3))
-        free = self.allowed(places)
-        if isinstance(self.volume, Sites) and free.sum() < n:
+        if isinstance(self.volume, Sites):
+            self._check_sites(self.volume)
+
+    def _check_sites(self, sites: Sites) -> None:
+        free, n = self.allowed(sites.positions), self.n_chips
+        if free.sum() < n:
             outside = f" outside the keep-out zones ({len(free)} in all)" if self.keep_out else ""
-            raise InputError(
-                f"{self.volume.name}: {free.sum()} candidate sites{outside} for {n} chips; give at least {n}"
-            )
-        if isinstance(self.volume, Sites) and self.non_recursive:
+            raise InputError(f"{sites.name}: {free.sum()} candidate sites{outside} for {n} chips; give at least {n}")
+        if self.non_recursive:
             raise InputError("a search free of ω² moves chips; give a volume in place of candidate sites")
-        object.__setattr__(self, "_places", places)
 
     @cached_property
     def unit(self) -> float:
         """Length that designs count as 1, m."""
         if isinstance(self.volume, Shape):
             return float(self.volume.half.max())
-        centre = (self._places.max(axis=0) + self._places.min(axis=0)) / 2.0
-        return float(np.abs(self._places - centre).max()) or 1.0
+        return float(np.ptp(self.volume.positions, axis=0).max()) / 2.0 or 1.0
 
     @cached_property
     def shape(self) -> Shape | None:
@@ -231,15 +229,16 @@ class Problem:
     def candidates(self, rng: np.random.Generator) -> Candidates:
         """Return chips to choose from: the sites, or anchors and random points of the volume."""
         if isinstance(self.volume, Sites):
-            free = np.flatnonzero(self.allowed(self._places))
+            places = self.volume.positions
+            free = np.flatnonzero(self.allowed(places))
             if not self.volume.axes or self.axes_per_chip == 3:
-                return self._everywhere(self._places[free] / self.unit, free)
+                return self._everywhere(places[free] / self.unit, free)
             frames = [
                 _combinations(self.volume.axes[one], self.axes_per_chip, f"{self.volume.name}: site {one + 1}")
                 for one in free
             ]
             site = np.repeat(free, [len(one) for one in frames])
-            return Candidates(self._places[site] / self.unit, np.concatenate(frames), site)
+            return Candidates(places[site] / self.unit, np.concatenate(frames), site)
         shape = self.volume
         points = np.vstack(
             [shape.centre + shape.anchors, shape.sample(max(_RANDOM_POINTS, _POINTS_PER_CHIP * self.n_chips), rng)]

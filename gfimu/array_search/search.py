@@ -199,7 +199,7 @@ def search(
         )
     if wanted.name == "gdop_joint":
         value = figures.gdop_joint  # without the prior on products of ω that no channel sees
-    in_box = wanted.name == "gdop" and k == 3 and problem.volume.name.startswith("a box") and _centred(problem)
+    in_box = wanted.name == "gdop" and k == 3 and _is_centred_box(problem)
     return SearchResult(
         array=array,
         score=figures,
@@ -320,8 +320,8 @@ def _sees_too_little(design: Design) -> bool:
     return bool(np.linalg.svd(design.rows[:, :6], compute_uv=False)[-1] < _UNSEEN)
 
 
-def _centred(problem: Problem) -> bool:
-    return problem.shape is not None and not problem.shape.centre.any()
+def _is_centred_box(problem: Problem) -> bool:
+    return problem.shape is not None and problem.shape.kind == "box" and not problem.shape.centre.any()
 
 
 def _failure(problem: Problem, design: Design | None) -> GeometryError:

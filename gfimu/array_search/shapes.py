@@ -10,6 +10,7 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -35,6 +36,8 @@ class Shape:
 
     Parameters
     ----------
+    kind : {"box", "sphere", "cylinder"}
+        Which it is.
     name : str
         What it is, in words.
     centre : ndarray, shape (3,)
@@ -53,6 +56,7 @@ class Shape:
         Points whose convex hull contains the shape, from the centre, m.
     """
 
+    kind: Literal["box", "sphere", "cylinder"]
     name: str
     centre: _Vector
     half: _Vector
@@ -78,7 +82,7 @@ class Shape:
         return np.asarray((self.walls(points) >= -tolerance).all(axis=-1))
 
     def scaled(self, factor: float) -> Shape:
-        """Return the shape with every length, the centre's included, times a factor."""
+        """Return the shape with every length, the centre's included, times a factor; its name stays."""
         return replace(
             self,
             centre=self.centre * factor,
@@ -129,6 +133,7 @@ def box(edges_m: ArrayLike, centre_m: ArrayLike = (0.0, 0.0, 0.0)) -> Shape:
     half = edges / 2.0
     corners = np.array(list(itertools.product((-1.0, 1.0), repeat=3))) * half
     return Shape(
+        "box",
         "a box of " + " × ".join(f"{edge:g}" for edge in edges) + " m",
         _centre(centre_m),
         half,
@@ -156,6 +161,7 @@ def sphere(radius_m: float, centre_m: ArrayLike = (0.0, 0.0, 0.0)) -> Shape:
     points = np.vstack([points, _directions()])
     reach = float(-ConvexHull(points).equations[:, 3].max())  # radius of the ball inside the polyhedron
     return Shape(
+        "sphere",
         f"a sphere of radius {radius_m:g} m",
         _centre(centre_m),
         np.full(3, float(radius_m)),
@@ -192,6 +198,7 @@ def cylinder(radius_m: float, height_m: float, axis: str = "z", centre_m: ArrayL
     levels = (-half, half) if half else (0.0,)
     middles = (-half, 0.0, half) if half else (0.0,)
     return Shape(
+        "cylinder",
         f"a cylinder of radius {radius_m:g} m and height {height_m:g} m along {axis}",
         _centre(centre_m),
         np.where(along > 0, half, radius_m),

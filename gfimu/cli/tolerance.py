@@ -35,7 +35,7 @@ def _tolerance(
     angle_deg: Annotated[float, typer.Option(help="Limit ± of each chip's rotation about each axis, °.")] = 0.5,
     normal: Annotated[
         bool,
-        typer.Option("--normal", help="Limits are 3 σ of a normal distribution; else errors are even between them."),
+        typer.Option("--normal", help="Limits are 3 σ of a normal distribution; else errors are uniform between them."),
     ] = False,
     part: Annotated[str | None, typer.Option(help="Part of every chip, in place of those of the array.")] = None,
     bias_mg: Annotated[float | None, typer.Option(help="Bias, 1 σ, mg; else the data sheet's.")] = None,

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["optimize"]
 
 _MOST_CHIPS, _MOST_RESTARTS = 200, 100_000  # more take days
+_MORE_CHIPS = 4  # of a front over chips, beyond the least number, unless the largest is given
 
 
 @writes(
@@ -51,7 +52,7 @@ def optimize(
     report: Callable[[Any], None] | None = None,
     n_chips: int | None = None,
 ) -> SearchResult | Front:
-    """Search the array of chips in a volume for which an objective is least, or the front of two respects.
+    """Search the array of chips in a volume for which an objective is least, or the front of two objectives.
 
     Parameters
     ----------
@@ -112,7 +113,7 @@ def optimize(
     from gfimu.files.atomic_file import write_text
 
     if (pareto is None) != (front is None):
-        raise InputError("--pareto A B and --front DIR go together: the two respects, and the folder of their front")
+        raise InputError("--pareto A B and --front DIR go together: the two objectives, and the folder of their front")
     if pareto is not None and (out is not None or picture is not None):
         raise InputError("a front has many arrays, which --front takes; leave out --out and --picture")
     number = n_chips if chips is None else chips
@@ -141,7 +142,7 @@ def optimize(
             conditions,
             pareto,
             source,
-            most_chips=most_chips or problem.n_chips + 4,
+            most_chips=most_chips or problem.n_chips + _MORE_CHIPS,
             starts=wanted.starts,
             report=report,
         )

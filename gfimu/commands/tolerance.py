@@ -25,6 +25,7 @@ __all__ = ["ToleranceResult", "tolerance"]
 
 _FORMAT_VERSION = 1
 _LEAST_UNITS, _MOST_UNITS = 10, 100_000  # fewer have no spread to speak of; more take hours
+_USUAL_TIME_S = 3.0  # of the reference motion: a second at the rate, after rest and ramp
 _MOST_SAMPLES = 6000  # numerical: memory of the first-order maps, 1 GB with 24 channels
 
 
@@ -141,7 +142,7 @@ def tolerance(
     angle_deg : float
         Limit of the rotation of each chip about each axis, °.
     normal : bool
-        Take both limits for three standard deviations of a normal distribution; else errors are even between them.
+        Take both limits for three standard deviations of a normal distribution; else errors are uniform between them.
     part : str, optional
         Part of every chip, in place of those of the array.
     bias_mg, gain_percent, cross_axis_percent, nonlinearity_percent : float, optional
@@ -250,16 +251,16 @@ def _run(
 ) -> tuple[Scenario, str]:
     """Return the run with the array as drawn and nothing wrong in it, and what it is in words."""
     from sim.scenarios import Scenario
-    from sim.toleranced import LEAST_TIME_S, reference_motion
+    from sim.toleranced import LEAST_TIME_S, REST_S, reference_motion
 
     if scenario is None:
-        length = 3.0 if time is None else time
+        length = _USUAL_TIME_S if time is None else time
         if not LEAST_TIME_S < length < math.inf:
             raise InputError(f"--time {length:g}: the default motion is longer than {LEAST_TIME_S:g} s; give more")
         if not 0.0 < abs(rate) <= 1e3:
             raise InputError(f"--rate {rate:g}: give a rate of at most 1000 rad/s that is not zero")
         run = reference_motion(array, time=length, rate=rate)
-        words = f"at rest for 1.5 s, then spun up to {rate:g} rad/s about the vertical, {length:g} s in all"
+        words = f"at rest for {REST_S:g} s, then spun up to {rate:g} rad/s about the vertical, {length:g} s in all"
     else:
         given = scenario if isinstance(scenario, Scenario) else Scenario.load(scenario)
         length = given.duration if time is None else time

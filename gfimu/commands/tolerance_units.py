@@ -108,10 +108,10 @@ def _batches(task: UnitTask, batches: Sequence[range], workers: int) -> Iterator
         for batch in batches:
             yield unit_rows(task, batch)
         return
-    from sim.sweep.executors import open_executor
+    from sim.sweep.executors import open_workers
 
-    with open_executor(workers) as executor:
-        yield from executor.map(unit_rows, [task] * len(batches), batches)
+    with open_workers(workers) as opened:
+        yield from opened.executor.map(unit_rows, [task] * len(batches), batches)
 
 
 def _gather(found: Sequence[dict[str, float] | str]) -> UnitErrors:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.parts.part_file import PartFile
@@ -54,6 +54,10 @@ class Part:
         part = PartFile.load(name, files)
         return cls(part.name, part.lsb_m_s2, np.array(part.noise_lsb_rms_100_hz) * part.lsb_m_s2)
 
+    def noise_std(self, output_data_rate: float) -> NDArray[np.float64]:
+        """Return the standard deviation of a sample at an output data rate in Hz, per axis, shape (3,), m/s²."""
+        return self.noise_std_100_hz * _noise_growth(output_data_rate)
+
 
 def white_noise_std(array: AccelerometerArray, sample_rate: float) -> NDArray[np.float64]:
     """Return the standard deviation of one sample of each channel by the data sheets, shape (c,), m/s².
@@ -64,4 +68,9 @@ def white_noise_std(array: AccelerometerArray, sample_rate: float) -> NDArray[np
     """
     parts = {chip.part: Part.load(chip.part, array.part_files) for chip in array.chips}
     at_100_hz = [parts[chip.part].noise_std_100_hz[: len(chip.axes)] for chip in array.chips]
-    return np.concatenate(at_100_hz) * np.sqrt(np.maximum(array.output_data_rates(sample_rate), 100.0) / 100.0)
+    return np.concatenate(at_100_hz) * _noise_growth(array.output_data_rates(sample_rate))
+
+
+def _noise_growth(output_data_rate: ArrayLike) -> NDArray[np.float64]:
+    """Return the noise of a sample at output data rates in Hz over that at 100 Hz; see `white_noise_std`."""
+    return np.asarray(np.sqrt(np.maximum(output_data_rate, 100.0) / 100.0))

@@ -19,7 +19,7 @@ from gfimu.short_repr import short_repr
 from gfimu.tolerances.calibrated import Poses, Remaining, remaining
 from gfimu.tolerances.known_motion import KnownMotion
 from gfimu.tolerances.propagation import ErrorMaps, error_maps
-from gfimu.tolerances.tolerances import CAUSES, Tolerances
+from gfimu.tolerances.tolerances import CAUSES, SHAPES, Tolerances
 
 __all__ = ["QUANTITIES", "QuantityBudget", "ToleranceBudget", "tolerance_budget"]
 
@@ -105,10 +105,12 @@ class QuantityBudget:
         rows = max((factor.shape[0] for factor in self.factors.values()), default=3)
         total = np.zeros((count, rows))
         for cause, factor in self.factors.items():
-            even = shape == "uniform" and cause in {"placement", "angles"}
-            edge = math.sqrt(3.0)
             size = (count, factor.shape[1])
-            total += (rng.uniform(-edge, edge, size) if even else rng.standard_normal(size)) @ factor.T
+            if shape == "uniform" and cause in {"placement", "angles"}:
+                unit_draws = rng.uniform(-SHAPES["uniform"], SHAPES["uniform"], size)  # of unit variance
+            else:
+                unit_draws = rng.standard_normal(size)
+            total += unit_draws @ factor.T
         if self.samples:
             return np.asarray(np.sqrt(self._with_mean_noise(np.sum(total**2, axis=1), rng)))
         total[:, :3] += rng.multivariate_normal(np.zeros(3), self.noise_covariance, count, check_valid="ignore")

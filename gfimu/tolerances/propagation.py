@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from gfimu.bounds.sample import omega_products_jacobian
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.geometry.linear_solution import linear_solution
 from gfimu.motion.attitude import to_rotation
@@ -31,7 +32,7 @@ from gfimu.rate.sensing import ChannelTables, SensorErrors
 from gfimu.short_repr import short_repr
 from gfimu.tolerances.known_motion import KnownMotion, cross_matrix
 
-__all__ = ["ErrorMaps", "error_maps", "null_space_maps", "product_slope"]
+__all__ = ["ErrorMaps", "error_maps", "null_space_maps", "null_space_of"]
 
 Floats = NDArray[np.float64]
 
@@ -75,7 +76,7 @@ def error_maps(array: AccelerometerArray, motion: KnownMotion) -> ErrorMaps:
     c = array.n_channels
     solution = linear_solution(array, np.eye(c), np.ones(c))
     inverse, leakage = solution.motion.T, solution.leakage[0]  # (6, c), (6, 6)
-    slope = product_slope(motion.omega)  # (n, 6, 3)
+    slope = omega_products_jacobian(motion.omega)  # (n, 6, 3)
     feedback, of_p = leakage[:3] @ slope, leakage[3:] @ slope  # (n, 3, 3)
     flow, inputs = _dynamics(motion, feedback, of_p)
     weights = _adjoint(flow, motion.step)  # (n, 9, 12)
@@ -98,7 +99,7 @@ def null_space_maps(array: AccelerometerArray, motion: KnownMotion) -> Floats | 
     turning = motion.turning
     if len(rows) < 3 or not turning.any():
         return None
-    slope = sensitivity @ product_slope(motion.omega[turning])  # (k, d, 3)
+    slope = sensitivity @ omega_products_jacobian(motion.omega[turning])  # (k, d, 3)
     strengths = np.linalg.svd(slope, compute_uv=False)
     if np.any(strengths[:, -1] < _DETERMINED * strengths[:, 0]):
         return None
@@ -110,14 +111,6 @@ def null_space_of(array: AccelerometerArray, motion: KnownMotion) -> tuple[Float
     noise = white_noise_std(array, 1.0 / motion.step)
     tables = ChannelTables(array, SensorErrors.uniform(array, noise))
     return tables.null_rows[0], tables.null_sensitivity[0]
-
-
-def product_slope(omega: Floats) -> Floats:
-    """Return ∂s/∂ω of the products xx, yy, zz, xy, xz, yz, shape (n, 6, 3)."""
-    x, y, z = omega.T
-    none = np.zeros_like(x)
-    rows = [(2 * x, none, none), (none, 2 * y, none), (none, none, 2 * z), (y, x, none), (z, none, x), (none, z, y)]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=1)
 
 
 def _dynamics(motion: KnownMotion, feedback: Floats, of_p: Floats) -> tuple[Floats, Floats]:

@@ -79,7 +79,7 @@ class Tolerances:
     angle_rad : float
         Limit of the rotation of each chip about each body axis, rad.
     shape : {"uniform", "normal"}
-        Distribution inside these two limits: even between them, or normal with the limit at three standard deviations.
+        Distribution inside these two limits: uniform between them, or normal with the limit at 3 σ.
     bias, gain, noise : ndarray, shape (c,)
         Standard deviations of the bias, m/s², the relative gain error, and the white noise of a sample, m/s².
     cross_axis : ndarray, shape (c,)

@@ -29,7 +29,7 @@ _OF_CHIP = {
 def stated_tolerances(tolerances: Tolerances) -> Iterator[tuple[str, str, str]]:
     """Yield each cause with its size in the field's unit, and where the size is from."""
     milli_g = 1e-3 * STANDARD_GRAVITY
-    machined = "limits, even between them" if tolerances.shape == "uniform" else "limits at 3 σ, normal"
+    machined = "limits, uniform between them" if tolerances.shape == "uniform" else "limits at 3 σ, normal"
     yield "placement", f"±{1e3 * tolerances.placement_m:.3g} mm", f"each chip and axis; {machined}"
     yield "angles", f"±{math.degrees(tolerances.angle_rad):.3g}°", f"each chip about each axis; {machined}"
     for cause, values, factor, unit in (

@@ -15,11 +15,11 @@ from typing import Any
 from threadpoolctl import threadpool_limits
 
 from gfimu.errors import GfimuError
+from sim.sweep.batch_work import prepared
 from sim.sweep.dataset import Dataset
 from sim.sweep.design import Case, Design
 from sim.sweep.pace import running
 from sim.sweep.plan import PlanFile
-from sim.sweep.together import prepared
 
 __all__ = ["Work", "Workers", "run_campaign"]
 
@@ -86,11 +86,11 @@ def run_campaign(
         If a worker can't run batches at all.
     """
     design = Design(dataset.plan)
-    tell = progress or (lambda done, total: None)
+    report = progress or (lambda done, total: None)
     present = set(dataset.present())
     missing = [batch for batch in design.batches() if batch not in present]
     done = len(design) - sum(map(len, missing))
-    tell(done, len(design))
+    report(done, len(design))
     ran = 0
     # Closed here whatever happens, so that an error or Ctrl-C ends the workers before it is reported.
     with closing(_Batches(dataset.plan, work, missing).results(open_workers)) as results, running(dataset) as note:
@@ -98,7 +98,7 @@ def run_campaign(
             dataset.write(batch, rows)
             ran += len(batch)
             note(ran)
-            tell(done + ran, len(design))
+            report(done + ran, len(design))
     return ran
 
 

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
-from concurrent.futures import Executor
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager
 
 from sim.sweep.cluster import open_cluster
 from sim.sweep.engine import Workers
 from sim.sweep.pool import open_pool
 
-__all__ = ["open_executor", "open_workers", "processors"]
+__all__ = ["open_workers", "processors"]
 
 
 def processors() -> int:
@@ -28,10 +26,3 @@ def open_workers(count: int, cluster: str = "") -> AbstractContextManager[Worker
         If no worker can start, or no scheduler answers.
     """
     return open_cluster(cluster) if cluster else open_pool(count)
-
-
-@contextmanager
-def open_executor(workers: int, cluster: str = "") -> Iterator[Executor]:
-    """Open the executor of `open_workers` alone."""
-    with open_workers(workers, cluster) as opened:
-        yield opened.executor

@@ -11,6 +11,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
+from scipy.stats import binomtest
 
 from gfimu.errors import unknown_name
 from sim.sweep.plan import PlanFile, RangeTable, Value
@@ -20,7 +21,6 @@ __all__ = ["Group", "failures", "grouped", "numbers", "result_names", "share_of"
 _QUANTILES = (0.05, 0.5, 0.95)
 _NO_RESULT = {"case", "seed", "failure"}
 _BINS = 5  # of equal count, of a range that is grouped by
-_Z95 = 1.959964  # numerical: 97.5 % quantile of the normal distribution
 
 
 @dataclass(frozen=True)
@@ -159,6 +159,6 @@ def _quantiles(column: NDArray[np.float64]) -> tuple[float, float, float]:
 
 def share_of(truths: NDArray[np.float64]) -> tuple[float, float, float]:
     """Return Wilson's 95 % interval of a share, and the share between its limits."""
-    n, share, z = len(truths), float(np.mean(truths)), _Z95
-    centre, half = share + z**2 / (2 * n), z * np.sqrt(share * (1 - share) / n + z**2 / (4 * n**2))
-    return float((centre - half) / (1 + z**2 / n)), share, float((centre + half) / (1 + z**2 / n))
+    counted = binomtest(int(np.sum(truths)), len(truths))
+    interval = counted.proportion_ci(0.95, method="wilson")
+    return float(interval.low), float(counted.statistic), float(interval.high)

@@ -139,6 +139,13 @@ def test_drift_is_the_budget_without_the_mean_fall(random_array):
     assert value == pytest.approx(np.sqrt(np.trace(budget.covariance) - budget.fall**2), rel=1e-9)
 
 
+def test_noise_of_the_part_is_that_at_the_sample_rate():
+    """The density of the noise does not depend on the rate, so neither does the drift."""
+    at_100, at_1600 = Conditions(), Conditions(sample_rate_hz=1600.0)
+    assert at_1600.noise == pytest.approx(4.0 * at_100.noise)
+    assert at_1600.sources.noise_density == pytest.approx(at_100.sources.noise_density)
+
+
 def test_the_worst_draw_counts_and_the_nominal_array_is_one_of_them(random_array):
     problem, design, _ = random_array
     loose = Problem(6, 3, CUBE, tolerance=Tolerance(0.002, 0.05, 16))

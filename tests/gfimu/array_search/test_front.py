@@ -1,4 +1,4 @@
-"""Fronts of two respects: nothing dominated, ends at the single optima, refusals."""
+"""Fronts of two objectives: nothing dominated, ends at the single optima, refusals."""
 
 import numpy as np
 import pytest
@@ -46,6 +46,8 @@ def test_a_smaller_volume_costs_in_one_unit_of_length():
     sizes, values = np.array([point.values for point in found.points]).T
     assert sizes[-1] == pytest.approx(0.1)
     np.testing.assert_allclose(values, np.sqrt(0.375 * (0.1 / sizes) ** 2 + 0.75), rtol=1e-6)
+    assert found.points[0].array.description.endswith("in a box of 0.1 × 0.1 × 0.1 m with all lengths times 0.3")
+    assert found.points[-1].array.description.endswith("in a box of 0.1 × 0.1 × 0.1 m")
 
 
 def test_worst_case_against_nominal():

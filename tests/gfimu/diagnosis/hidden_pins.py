@@ -23,7 +23,7 @@ from hidden_cases import HiddenCase, hidden_cases
 
 from sim.study.outcome import run_case
 from sim.study.report import score, visible
-from sim.sweep.executors import open_executor
+from sim.sweep.executors import open_workers
 
 PINS = Path(__file__).with_name("hidden_cases.toml")
 
@@ -189,8 +189,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stderr.write(f"no case has {' or '.join(options.parts)} in its name; see {PINS}\n")
         return 2
     old, outcomes, otherwise = Pins.load(), {}, 0
-    with open_executor(options.workers) as executor:
-        futures = {hidden.name: executor.submit(run_case, hidden.case, hidden.source) for hidden in wanted}
+    with open_workers(options.workers) as opened:
+        futures = {hidden.name: opened.executor.submit(run_case, hidden.case, hidden.source) for hidden in wanted}
         for hidden in wanted:
             outcome = outcomes[hidden.name] = futures[hidden.name].result()
             known = hidden.name in old.reports or hidden.name in old.misses

@@ -16,7 +16,7 @@ from gfimu.rate.maximum_likelihood import rates_of_null_space
 from gfimu.recording import Recording
 from gfimu.tolerances.budget import tolerance_budget
 from gfimu.tolerances.calibrated import remaining
-from gfimu.tolerances.propagation import error_maps, null_space_of, product_slope
+from gfimu.tolerances.propagation import error_maps, null_space_of
 from sim.toleranced import draw_unit, known_motion_of, reference_motion
 
 ARRAYS = ("cube12", "p1_face_diagonals", "p2_face_centres", "p3_three_plus_one")
@@ -154,19 +154,6 @@ def test_what_the_noise_of_the_poses_leaves():
     seen = np.mean(np.square(errors), axis=0)
     assert np.mean(seen / predicted) == pytest.approx(1.0, abs=0.1)
     assert np.median(seen / predicted) == pytest.approx(1.0, abs=0.1)
-
-
-def test_slope_of_the_products():
-    omega, step = np.array([[1.0, -2.0, 3.0]]), 1e-6
-
-    def products(w):
-        x, y, z = w[0]
-        return np.array([x * x, y * y, z * z, x * y, x * z, y * z])
-
-    numeric = np.column_stack(
-        [(products(omega + step * e) - products(omega - step * e)) / (2 * step) for e in np.eye(3)]
-    )
-    np.testing.assert_allclose(product_slope(omega)[0], numeric, atol=1e-8)
 
 
 def noisy_runs(run, motion, tolerances, *, rest, count):

@@ -1,4 +1,4 @@
-"""Kinds of cases that are quicker together than one by one."""
+"""Work that is quicker for the cases of a batch at once than one by one."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from typing import Any, Protocol, runtime_checkable
 
 from sim.sweep.design import Case
 
-__all__ = ["TogetherWork", "prepared"]
+__all__ = ["BatchWork", "prepared"]
 
 _Work = Callable[[Case], Mapping[str, Any]]
 
 
 @runtime_checkable
-class TogetherWork(Protocol):
+class BatchWork(Protocol):
     """What a case does, for the cases of a batch at once; the results must not depend on which cases are together."""
 
     def __call__(self, case: Case) -> Mapping[str, Any]:
@@ -26,8 +26,8 @@ class TogetherWork(Protocol):
 
 
 def prepared(work: _Work, cases: Sequence[Case]) -> _Work:
-    """Return what gives the results of each of these cases: of a `TogetherWork` they are run at once, now."""
-    if not isinstance(work, TogetherWork):
+    """Return what gives the results of each of these cases: of a `BatchWork` they are run at once, now."""
+    if not isinstance(work, BatchWork):
         return work
     try:
         return work.prepared(cases)
