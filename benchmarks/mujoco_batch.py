@@ -19,8 +19,8 @@ from dataclasses import replace  # noqa: E402
 import mujoco  # noqa: E402
 import numpy as np  # noqa: E402
 
-from sim.dc_motor import DcMotor  # noqa: E402
-from sim.driven import Drive, drive_all  # noqa: E402
+from sim.rigs.dc_motor import DcMotor  # noqa: E402
+from sim.rigs.driven import Drive, drive_all  # noqa: E402
 from sim.scenarios import Scenario, simulate  # noqa: E402
 
 ROUNDS = 5

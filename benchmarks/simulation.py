@@ -14,10 +14,10 @@ import numpy as np
 
 from gfimu.geometry.array import AccelerometerArray
 from sim import forward
-from sim.driven import drive
 from sim.profiles import Tumble, speed_sweep, spin_profile
+from sim.rigs.driven import drive
+from sim.rigs.turntable import prescribed_readings
 from sim.scenarios import Scenario, simulate
-from sim.turntable import prescribed_readings
 from sim.world import World
 
 RATE = 100.0

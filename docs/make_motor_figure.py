@@ -17,7 +17,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.driven import DrivenRun, drive
+from sim.rigs.driven import DrivenRun, drive
 from sim.scenarios import Scenario
 
 GREY, ORANGE = "#7f7f7f", "#d95f02"

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from gfimu.visual.colours import chip_colour
 from gfimu.visual.rig import is_cube
 from gfimu.visual.scene import Box, Cylinder, Mesh, Shape
-from sim.rig_model import turntable_model
+from sim.rigs.rig_model import turntable_model
 from sim.world import World
 
 __all__ = ["rig_drawing"]

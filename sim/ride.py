@@ -19,10 +19,10 @@ from gfimu.errors import InputError
 from sim import forward
 from sim.adxl345 import Sensor, conversion_offsets
 from sim.data_sheet import DataSheet
-from sim.driven import drive
 from sim.motion import SpinMotion, SpinState
+from sim.rigs.driven import drive
+from sim.rigs.turntable import prescribed_readings
 from sim.scenarios import Scenario
-from sim.turntable import prescribed_readings
 from sim.world import SampleContext
 
 __all__ = ["Ride"]

@@ -19,10 +19,10 @@ from gfimu.motion.earth import EarthRotation
 from gfimu.units import STANDARD_GRAVITY
 from sim.adxl345 import SensorSettings
 from sim.data_sheet import DataSheet
-from sim.dc_motor import DcMotor
 from sim.effect_table import EffectTable
 from sim.motion_file import MotionTable, ProfileTable
-from sim.motor_file import MotorTable
+from sim.rigs.dc_motor import DcMotor
+from sim.rigs.motor_file import MotorTable
 from sim.twin_file import Inclination
 
 __all__ = ["ReferenceSettings", "ScenarioFile", "scenario_fields"]

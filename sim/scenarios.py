@@ -25,15 +25,15 @@ from sim import forward
 from sim.adxl345 import Sensor, SensorSettings
 from sim.carried import Carriage, Wheel
 from sim.conversions import conversion_groups
-from sim.dc_motor import DcMotor
-from sim.driven import drive
 from sim.earth import earth_in_body
 from sim.effects import NOT_OF_A_CARRIAGE, Effect, apply_effects
 from sim.effects.unlisted import Unlisted
 from sim.motion import BodyMotion, BodyState, SpinMotion, SpinState
+from sim.rigs.dc_motor import DcMotor
+from sim.rigs.driven import drive
+from sim.rigs.turntable import prescribed_readings
 from sim.scenario_file import ReferenceSettings, scenario_fields
 from sim.truth import cube_state, truth_columns
-from sim.turntable import prescribed_readings
 from sim.world import SampleContext, World
 
 __all__ = ["ReferenceSettings", "Scenario", "simulate", "summarise"]

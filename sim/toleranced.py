@@ -1,8 +1,8 @@
 """Units of an array with errors drawn inside its tolerances, and what their boards record.
 
 Each unit has its own places and rotations of the chips and its own chip errors; the physics is that of MuJoCo
-(`sim.turntable.prescribed_readings`) with the array as built, so nothing here is linearised. Converter, bandwidth and
-sampling are ideal: they are no tolerances.
+(`sim.rigs.turntable.prescribed_readings`) with the array as built, so nothing here is linearised. Converter, bandwidth
+and sampling are ideal: they are no tolerances.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from gfimu.tolerances.tolerances import Tolerances
 from sim.adxl345 import SensorErrors
 from sim.motion import BodyState
 from sim.profiles import Hold, Ramp, Segment, spin_profile
+from sim.rigs.turntable import prescribed_readings
 from sim.scenarios import Scenario
 from sim.truth import cube_state
-from sim.turntable import prescribed_readings
 
 __all__ = [
     "CALIBRATED_AT",

@@ -2,7 +2,7 @@
 
 Channels = sensing(effects(rigid body(motion, geometry))). A `World` holds what each stage needs; an effect
 (`sim.effects`) returns a changed world; the analytic forward model (`sim.forward`) and the MuJoCo rig
-(`sim.turntable`) both read the same world, so every effect is carried by both.
+(`sim.rigs.turntable`) both read the same world, so every effect is carried by both.
 
 Frames: the world has z up. The axis frame is the world turned by ``axis_rotvec`` (the table's axis not vertical)
 and by the nod; the table frame is the axis frame turned by the angle θ about its z; the cube frame is the table

@@ -11,7 +11,7 @@ import numpy as np
 from gfimu.errors import InputError
 
 if TYPE_CHECKING:
-    from sim.driven import Drive, DrivenRun
+    from sim.rigs.driven import Drive, DrivenRun
     from sim.sweep.design import Case
     from sim.sweep.plan import Value
 
@@ -25,7 +25,7 @@ _DRAWN = ("mount_std_m", "mount_std_rad", "tilt_std_rad")
 
 @dataclass(frozen=True)
 class DriveWork:
-    """Drive the table of a scenario by its motor; the cases of a batch advance together (`sim.driven.drive_all`).
+    """Drive the table of a scenario by its motor; the cases of a batch advance together (`sim.rigs.driven.drive_all`).
 
     Factors: ``scenario`` (one with a driven table), any key of its file, and tolerances whose errors are drawn by the
     seed: ``mount_std_m`` of the cube's place along each axis, ``mount_std_rad`` of its attitude about each,
@@ -42,7 +42,7 @@ class DriveWork:
 
     def prepared(self, cases: Sequence[Case]) -> _Done:
         """Run cases together and return what gives the results of each."""
-        from sim.driven import drive_all
+        from sim.rigs.driven import drive_all
 
         results: dict[int, Mapping[str, float] | InputError] = {}
         drives: dict[int, Drive] = {}
@@ -77,7 +77,7 @@ class _Done:
 
 def _drive(case: Case) -> Drive:
     """Return the run of a case."""
-    from sim.driven import Drive
+    from sim.rigs.driven import Drive
     from sim.scenarios import Scenario
 
     keys: dict[str, Value] = dict(case.values)

@@ -1,4 +1,4 @@
-"""Under `gfimu convert`: a recording in another format."""
+"""Under `gfimu convert`: a recording in another format, a calibration as YAML, an array as a MuJoCo model."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def convert(
         With a map: the table, topic or member of a file that holds several.
     to : {"kalibr", "ros", "turntable", "motor_turntable", "free_cube"}, optional
         Of a calibration, the format: `gfimu.exporting.kalibr`, `gfimu.exporting.ros`. Of an array, what carries it in
-        the MuJoCo model (`sim.mjcf_export`), by default the turntable.
+        the MuJoCo model (`sim.rigs.mjcf_export`), by default the turntable.
     lsb_m_s2 : float, optional
         Of a calibration for raw counts: size of a count by which the sensor's driver makes m/s² of counts; by default
         that of the array's parts.

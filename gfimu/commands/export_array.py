@@ -14,7 +14,7 @@ __all__ = ["export_array"]
 
 
 def export_array(array: AccelerometerArray, target: str | Path | None, rig: str | None) -> AccelerometerArray:
-    """Write an array as a MuJoCo model and return it; see `sim.mjcf_export.array_as_mjcf`.
+    """Write an array as a MuJoCo model and return it; see `sim.rigs.mjcf_export.array_as_mjcf`.
 
     Raises
     ------
@@ -22,7 +22,7 @@ def export_array(array: AccelerometerArray, target: str | Path | None, rig: str 
         If the target is no ``.xml`` file, or there is no such rig.
     """
     from gfimu.files.atomic_file import write_text
-    from sim.mjcf_export import array_as_mjcf
+    from sim.rigs.mjcf_export import array_as_mjcf
 
     if target is not None and Path(target).suffix != ".xml":
         raise InputError(f"{target}: an array is written as a MuJoCo model; name it .xml")

@@ -38,7 +38,7 @@ def as_array(array: AccelerometerArray | str | Path) -> AccelerometerArray:
     if not isinstance(array, str | Path):
         return array
     if str(array).endswith(".xml"):
-        from sim.mjcf_array import array_from_mjcf
+        from sim.rigs.mjcf_array import array_from_mjcf
 
         return array_from_mjcf(array)
     from gfimu.geometry.array import AccelerometerArray

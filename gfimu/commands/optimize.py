@@ -202,7 +202,7 @@ def _sites(wanted: BriefFile, brief: str | Path | None) -> Sites | None:
     beside = Path(brief).parent / table.file if brief is not None else Path(table.file)
     path = beside if beside.is_file() else Path(table.file)
     if path.suffix == ".xml":
-        from sim.mjcf_array import array_from_mjcf
+        from sim.rigs.mjcf_array import array_from_mjcf
 
         return sites_of_array(array_from_mjcf(path, sites=table.names), str(path))
     if path.suffix == ".toml":

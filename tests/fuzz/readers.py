@@ -51,7 +51,7 @@ def targets(folder: Path) -> dict[str, Target]:
     from gfimu.joining import open_reference
     from gfimu.parts.part import Part
     from gfimu.recording.formats import open_recording, open_run
-    from sim.mjcf_array import array_from_mjcf
+    from sim.rigs.mjcf_array import array_from_mjcf
     from sim.scenarios import Scenario
     from sim.twin import Twin
 

@@ -11,8 +11,8 @@ from sim import forward
 from sim.carried import Carriage
 from sim.effects import CARRIAGE_EFFECTS, NOT_OF_A_CARRIAGE, TABLE_EFFECTS, make_effect
 from sim.profiles import Chirp, Hold, Ramp, spin_profile
+from sim.rigs.turntable import prescribed_readings
 from sim.scenarios import Scenario
-from sim.turntable import prescribed_readings
 from sim.twin import Twin
 
 COURSE = spin_profile([Hold(0.2), Ramp(0.3, 0.2), Chirp(0.1, 2.0, 9.0, 2.0), Ramp(0.0, 0.1)])

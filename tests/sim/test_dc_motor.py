@@ -11,10 +11,10 @@ from gfimu.errors import InputError
 from gfimu.files.model_files import find_model
 from gfimu.geometry.array import AccelerometerArray
 from sim import forward
-from sim.dc_motor import DcMotor
-from sim.driven import Drive, drive
 from sim.motion import SpinState
 from sim.profiles import Hold, Ramp, spin_profile
+from sim.rigs.dc_motor import DcMotor
+from sim.rigs.driven import Drive, drive
 from sim.scenarios import Scenario
 from sim.world import World
 

@@ -9,10 +9,10 @@ from mujoco.batch import Batch, SimulationError
 
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
-from sim.dc_motor import DcMotor
-from sim.driven import Drive, drive, drive_all
 from sim.profiles import Hold, Ramp, spin_profile
-from sim.rig_model import channel_places
+from sim.rigs.dc_motor import DcMotor
+from sim.rigs.driven import Drive, drive, drive_all
+from sim.rigs.rig_model import channel_places
 from sim.world import World
 
 COLUMNS = ("t", "readings", "tacho", "torque")
@@ -79,7 +79,7 @@ def test_runs_of_several_kinds_and_lengths_come_back_in_order():
 def test_every_nth_state_is_one_of_all(monkeypatch, motor):
     (run,) = varied(1, motor)
     whole = drive(run.world, run.command, run.duration, motor=run.motor)
-    monkeypatch.setattr("sim.driven._CHUNK", 18 * 64)  # the log is put together of several pieces
+    monkeypatch.setattr("sim.rigs.driven._CHUNK", 18 * 64)  # the log is put together of several pieces
     (every,) = drive_all([run], every=10)
     np.testing.assert_array_equal(every.t, whole.t[::10])
     np.testing.assert_array_equal(every.readings, whole.readings[::10])

@@ -24,8 +24,8 @@ from sim.effects import EFFECTS, Effect, apply_effects, make_effect
 from sim.effects.low_pass import low_pass, mass_on_spring
 from sim.motion import SpinState, SplineSpin
 from sim.profiles import Chirp, Hold, Ramp, spin_profile
-from sim.rig_model import turntable_model
-from sim.turntable import prescribed_readings
+from sim.rigs.rig_model import turntable_model
+from sim.rigs.turntable import prescribed_readings
 from sim.twin import Twin
 from sim.world import SampleContext, World
 

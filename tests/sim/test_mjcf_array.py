@@ -6,7 +6,7 @@ import pytest
 from gfimu.errors import InputError, RecordingWarning
 from gfimu.files.model_files import find_model
 from gfimu.geometry.array import AccelerometerArray
-from sim.mjcf_array import array_from_mjcf
+from sim.rigs.mjcf_array import array_from_mjcf
 
 TURNED = """<mujoco>
   <worldbody>

@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 from gfimu.files.model_files import models_directory
 from gfimu.geometry.array import AccelerometerArray, Chip
 from gfimu.geometry.kinematics import specific_force
-from sim.mjcf_array import array_from_mjcf
-from sim.mjcf_export import RIGS, array_as_mjcf
+from sim.rigs.mjcf_array import array_from_mjcf
+from sim.rigs.mjcf_export import RIGS, array_as_mjcf
 
 ROUNDING = 1e-11  # m/s², of readings of some 10 m/s² through MuJoCo's tree
 

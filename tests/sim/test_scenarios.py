@@ -11,8 +11,8 @@ from gfimu.geometry.array import AccelerometerArray
 from gfimu.geometry.kinematics import specific_force
 from gfimu.recording import Recording
 from sim.effects import make_effect
+from sim.rigs.turntable import prescribed_readings
 from sim.scenarios import Scenario, simulate
-from sim.turntable import prescribed_readings
 
 SHIPPED = ["driven_run", "eccentric_mount", "motor_run", "paper_run", "rest", "speed_sweep", "tumble"]
 PERFECT = "sensor.perfect=true"

@@ -11,13 +11,13 @@ from gfimu.geometry.array import AccelerometerArray, Chip
 from gfimu.geometry.kinematics import specific_force
 from gfimu.units import STANDARD_GRAVITY
 from sim import forward
-from sim.driven import drive
 from sim.effects import make_effect
 from sim.motion import SpinState
 from sim.profiles import Chirp, Hold, Ramp, Tumble, spin_profile
-from sim.rig_model import free_model, turntable_model
+from sim.rigs.driven import drive
+from sim.rigs.rig_model import free_model, turntable_model
+from sim.rigs.turntable import prescribed_readings
 from sim.truth import cube_state
-from sim.turntable import prescribed_readings
 from sim.world import Nod, World
 
 TOLERANCE = 1e-9  # m/s²

@@ -13,8 +13,8 @@ from sim.effects import EFFECTS, FURTHER_EFFECTS, make_effect
 from sim.effects.rig import shake_orders, sway_shapes
 from sim.effects.unlisted import UNLISTED
 from sim.motion import SpinState
+from sim.rigs.turntable import prescribed_readings
 from sim.scenarios import Scenario
-from sim.turntable import prescribed_readings
 from sim.twin import Twin
 
 ARRAY = AccelerometerArray.load("cube12")

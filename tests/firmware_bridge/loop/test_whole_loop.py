@@ -24,8 +24,8 @@ from gfimu.geometry.array import AccelerometerArray
 from gfimu.motion.estimation import estimate
 from gfimu.recording import Recording
 from sim.ride import Ride
+from sim.rigs.turntable import prescribed_readings
 from sim.scenarios import Scenario, simulate
-from sim.turntable import prescribed_readings
 
 LSB = 0.038245935
 CHIPS = tuple(Adxl345Options(clock_error=0.004 * k - 0.006, phase=0.22 * k) for k in range(4))

@@ -9,7 +9,7 @@ import pytest
 import gfimu
 from gfimu.commands.campaign_drive import DriveWork
 from gfimu.errors import InputError
-from sim.driven import drive
+from sim.rigs.driven import drive
 from sim.scenarios import Scenario
 from sim.sweep.design import Case
 from sim.sweep.engine import run_batch
@@ -96,6 +96,6 @@ def test_a_batch_that_fails_as_a_whole_is_rows(tmp_path, monkeypatch):
     def broken(*_, **__):
         raise RuntimeError("no threads left")
 
-    monkeypatch.setattr("sim.driven.drive_all", broken)
+    monkeypatch.setattr("sim.rigs.driven.drive_all", broken)
     found = run_batch(load_plan(plan(tmp_path, 8)), DriveWork(), 0, 8)
     assert [row["failure"] for row in found] == ["RuntimeError: no threads left"] * 8

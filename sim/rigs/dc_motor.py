@@ -12,7 +12,7 @@ from typing import Literal
 import mujoco
 
 from gfimu.errors import InputError
-from sim.rig_model import SPIN_JOINT
+from sim.rigs.rig_model import SPIN_JOINT
 
 __all__ = ["MOTOR_FILE", "DcMotor"]
 

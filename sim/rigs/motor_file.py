@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Literal
 
 from gfimu.files.schema import NotNegative, Positive, Table, about
-from sim.dc_motor import DcMotor
+from sim.rigs.dc_motor import DcMotor
 
 __all__ = ["MotorTable"]
 

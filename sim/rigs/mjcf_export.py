@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from gfimu.errors import InputError, unknown_name
 from gfimu.geometry.array import AccelerometerArray
-from sim.mujoco_warnings import mujoco_warnings
-from sim.rig_model import channel_places, free_spec, turntable_spec
+from sim.rigs.mujoco_warnings import mujoco_warnings
+from sim.rigs.rig_model import channel_places, free_spec, turntable_spec
 from sim.world import World
 
 __all__ = ["RIGS", "array_as_mjcf"]

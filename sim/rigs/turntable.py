@@ -3,7 +3,7 @@
 The rig reads the same `World` as the analytic forward model (`sim.forward`) and computes the rigid-body part of the
 readings on its own: MuJoCo's tree, gravity and accelerometers instead of closed forms. Prescribed motion sets
 position, velocity and acceleration and asks `mj_inverse` for the sensors of exactly that state. Motion by a motor:
-`sim.driven`.
+`sim.rigs.driven`.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from gfimu import world_model
 from sim.earth import earth_readings
 from sim.forward import arm_growth, lean_states
 from sim.motion import BodyMotion, BodyState, SpinMotion
-from sim.mujoco_warnings import mujoco_warnings
-from sim.rig_model import (
+from sim.rigs.mujoco_warnings import mujoco_warnings
+from sim.rigs.rig_model import (
     LEAN_JOINT,
     NOD_JOINT,
     SPIN_JOINT,

@@ -12,8 +12,8 @@ import numpy as np
 from gfimu.errors import InputError, unknown_name
 from gfimu.files.input_file import check_input
 from gfimu.geometry.array import AccelerometerArray, Chip
-from sim.mjcf_size import check_mjcf_size
-from sim.mujoco_warnings import mujoco_warnings
+from sim.rigs.mjcf_size import check_mjcf_size
+from sim.rigs.mujoco_warnings import mujoco_warnings
 
 __all__ = ["array_from_mjcf"]
 

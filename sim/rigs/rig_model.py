@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from gfimu.errors import InputError
 from gfimu.files.model_files import find_model
 from gfimu.geometry.array import AccelerometerArray, Chip
-from sim.mujoco_warnings import mujoco_warnings
+from sim.rigs.mujoco_warnings import mujoco_warnings
 from sim.world import World
 
 __all__ = [
