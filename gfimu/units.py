@@ -9,6 +9,7 @@ from gfimu.errors import UnitError
 __all__ = [
     "GYRO_COLUMNS",
     "KEY_ENDINGS",
+    "MILLI_G",
     "NAME",
     "NUMBER",
     "RATIO",
@@ -24,10 +25,13 @@ __all__ = [
 STANDARD_GRAVITY = 9.80665
 """Standard gravity, m/s²."""
 
+MILLI_G = STANDARD_GRAVITY / 1000.0
+"""A thousandth of it, the unit mg, m/s²."""
+
 READING_UNITS: dict[str, float | None] = {
     "m_s2": 1.0,
     "g": STANDARD_GRAVITY,
-    "mg": STANDARD_GRAVITY / 1000.0,
+    "mg": MILLI_G,
     "lsb": None,
 }
 """Units of a sensing axis and their factor to m/s²; counts (``lsb``) need the part's sensitivity."""

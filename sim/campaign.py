@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
 from gfimu.recording import Recording
-from gfimu.units import STANDARD_GRAVITY
+from gfimu.units import MILLI_G
 from sim import forward
 from sim.effects import EFFECTS, Effect, make_effect
 from sim.motion import SpinMotion, SplineSpin
@@ -38,7 +38,6 @@ __all__ = [
 GRID, SMOOTHING = 5e-3, 0.08
 """Step of a drawn profile and standard deviation of the Gaussian that smooths it, s."""
 
-_MG = STANDARD_GRAVITY / 1000.0
 _POWERS = (0.25, 0.5, 2.0, 4.0)
 
 
@@ -62,7 +61,7 @@ class Measurement:
 
     duration: float = 40.0
     sample_rate: float = 100.0
-    bias_instability: float = 0.15 * _MG
+    bias_instability: float = 0.15 * MILLI_G
     tacho_noise: float = 0.02
     encoder_step: float = 0.0
 
@@ -270,7 +269,7 @@ def _shape(rng: np.random.Generator, name: str, setting: Measurement) -> dict[st
             "damping_ratio": float(rng.uniform(0.01, 0.08)),
         },
         "warm_up": {"time_constant_s": float(setting.duration * rng.uniform(0.08, 0.8))},
-        "hysteresis": {"width_m_s2": float(_MG * np.exp(rng.uniform(np.log(5.0), np.log(400.0))))},
+        "hysteresis": {"width_m_s2": float(MILLI_G * np.exp(rng.uniform(np.log(5.0), np.log(400.0))))},
         "axis_wobble": {"direction_rad": 0.0},
     }
     return draws.get(name, {})
@@ -283,7 +282,9 @@ def _saturation(rng, twin, magnitude, setting) -> dict[str, object]:  # type: ig
 
 _DISCRETE: Mapping[str, Callable[..., dict[str, Any]]] = {
     "noise": lambda rng, twin, magnitude, setting: {"factor": float(rng.uniform(1.5, 4.0))},
-    "bias_random_walk": lambda rng, twin, magnitude, setting: {"strength_m_s2_rts": float(rng.uniform(0.7, 6.0) * _MG)},
+    "bias_random_walk": lambda rng, twin, magnitude, setting: {
+        "strength_m_s2_rts": float(rng.uniform(0.7, 6.0) * MILLI_G)
+    },
     "saturation": _saturation,
     "coarse_resolution": lambda rng, twin, magnitude, setting: {
         "step_m_s2": float(twin.expected_noise(setting.sample_rate).quantum * 2 ** rng.integers(1, 4))

@@ -181,7 +181,7 @@ def tolerance(
     from gfimu.tolerances.picture import tolerance_picture
     from gfimu.tolerances.propagation import error_maps
     from gfimu.tolerances.tolerances import ChipErrors, Tolerances
-    from gfimu.units import STANDARD_GRAVITY
+    from gfimu.units import MILLI_G
     from sim.sweep.executors import processors
     from sim.toleranced import known_motion_of
 
@@ -192,13 +192,12 @@ def tolerance(
         raise InputError(f"--units {units}: give {_LEAST_UNITS} to {_MOST_UNITS}, or --closed-form for none")
     if seed < 0 or (workers is not None and workers < 1):
         raise InputError(f"--seed {seed}, --workers {workers}: a seed is zero or positive, workers are 1 or more")
-    milli_g = 1e-3 * STANDARD_GRAVITY
     chip = ChipErrors(
-        bias_m_s2=_scaled("--bias-mg", bias_mg, milli_g),
+        bias_m_s2=_scaled("--bias-mg", bias_mg, MILLI_G),
         gain=_scaled("--gain-percent", gain_percent, 0.01),
         cross_axis=_scaled("--cross-axis-percent", cross_axis_percent, 0.01),
         nonlinearity=_scaled("--nonlinearity-percent", nonlinearity_percent, 0.01),
-        noise_m_s2_rthz=_scaled("--noise-ug", noise_ug, 1e-3 * milli_g),
+        noise_m_s2_rthz=_scaled("--noise-ug", noise_ug, 1e-3 * MILLI_G),
     )
     drawn = as_array(array)
     if part is not None:

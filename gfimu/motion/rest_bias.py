@@ -27,11 +27,9 @@ from gfimu.recording import Recording
 from gfimu.recording.checks import Finding, check_recording, refuse_or_warn, without_dead_channels
 from gfimu.recording.rest import Rest, detect_rest, mean_variance_factor
 from gfimu.short_repr import short_repr
-from gfimu.units import STANDARD_GRAVITY
+from gfimu.units import MILLI_G, STANDARD_GRAVITY
 
 __all__ = ["ForceAtRest", "RestBias", "estimate_from_rest", "force_at_rest", "rest_bias"]
-
-_MILLI_G = STANDARD_GRAVITY / 1000.0
 
 
 @dataclass(frozen=True)
@@ -89,8 +87,8 @@ class RestBias:
         others = f" (and {beyond - 1} more channels exceed theirs)" if beyond > 1 else ""
         text = (
             f"channel {self.array.channels[worst]} of array {self.array.name!r} reads "
-            f"{self.bias[worst] / _MILLI_G:+.0f} mg beyond gravity at rest; "
-            f"its data sheet allows {limit[worst] / _MILLI_G:.0f} mg{others}: the table is not level or the mounting "
+            f"{self.bias[worst] / MILLI_G:+.0f} mg beyond gravity at rest; "
+            f"its data sheet allows {limit[worst] / MILLI_G:.0f} mg{others}: the table is not level or the mounting "
             "another, the unit, order, sign or array is wrong, the body turned, or the chip is damaged"
         )
         return (Finding("rest_bias", text, True, (self.array.channels[worst],)),)
@@ -178,11 +176,11 @@ def force_at_rest(
     return ForceAtRest(
         float(t[0]),
         float(t[-1]),
-        (mean - gravity * up) / _MILLI_G,
-        np.sqrt(np.diag(covariance)) / _MILLI_G,
+        (mean - gravity * up) / MILLI_G,
+        np.sqrt(np.diag(covariance)) / MILLI_G,
         float(np.arctan2(np.linalg.norm(np.cross(up, mean)), up @ mean)),
-        float(np.linalg.norm(mean) - gravity) / _MILLI_G,
-        float(np.sqrt(direction @ covariance @ direction)) / _MILLI_G,
+        float(np.linalg.norm(mean) - gravity) / MILLI_G,
+        float(np.sqrt(direction @ covariance @ direction)) / MILLI_G,
     )
 
 

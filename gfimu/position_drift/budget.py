@@ -23,8 +23,8 @@ from gfimu.position_drift.closed_forms import (
     ErrorSources,
     accumulated_covariance,
     attitude_growth,
-    position_from_alpha,
-    position_from_p,
+    position_from_bias,
+    position_from_impulse,
     position_from_rate,
 )
 from gfimu.short_repr import short_repr
@@ -311,13 +311,10 @@ class _Covariances:
         return accumulated_covariance(self._of_bias, motion, self.time, self.rate)
 
     def _of_bias(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
-        from_alpha = position_from_alpha(t, self.rate, self.offset, self.gravity)
-        return np.concatenate([from_alpha, position_from_p(t, self.rate)], axis=-1)  # (..., 3, 6)
+        return position_from_bias(t, self.rate, self.offset, self.gravity)  # (..., 3, 6)
 
     def _of_impulse(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
-        # An impulse of alpha is a step of the rate, one of p a step of the velocity.
-        from_alpha = position_from_rate(t, self.rate, self.offset, self.gravity)
-        return np.concatenate([from_alpha, t[:, None, None] * np.eye(3)], axis=-1)  # (m, 3, 6)
+        return position_from_impulse(t, self.rate, self.offset, self.gravity)  # (m, 3, 6)
 
 
 def _valid_until(

@@ -39,6 +39,8 @@ __all__ = [
     "attitude_growth",
     "position_error",
     "position_from_alpha",
+    "position_from_bias",
+    "position_from_impulse",
     "position_from_p",
     "position_from_rate",
 ]
@@ -167,6 +169,20 @@ def position_from_alpha(t: ArrayLike, rate: float, offset: complex, gravity: flo
     heading = -0.5j * rate**2 * offset * t**4 * (phi_2 - 4.0 * phi_3 + 6.0 * phi_4)  # φ₂″
     lift = -(rate**2) * t**4 * offset * phi_4
     return _with_offset(matrix, heading, lift)
+
+
+def position_from_bias(t: ArrayLike, rate: float, offset: complex, gravity: float) -> NDArray[np.float64]:
+    """Position error per constant bias of [alpha; p], shape (..., 3, 6)."""
+    return np.concatenate([position_from_alpha(t, rate, offset, gravity), position_from_p(t, rate)], axis=-1)
+
+
+def position_from_impulse(t: NDArray[np.float64], rate: float, offset: complex, gravity: float) -> NDArray[np.float64]:
+    """Position error per impulse of [alpha; p] at times ``t`` before, (m,), body axes of then, shape (m, 3, 6).
+
+    An impulse of alpha is a step of the rate, one of p a step of the velocity.
+    """
+    from_alpha = position_from_rate(t, rate, offset, gravity)
+    return np.concatenate([from_alpha, t[:, None, None] * np.eye(3)], axis=-1)
 
 
 def accumulated_covariance(

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.position_drift.closed_forms import ErrorSources, position_from_alpha, position_from_p, position_from_rate
+from gfimu.position_drift.closed_forms import ErrorSources, position_from_bias, position_from_impulse
 from gfimu.units import STANDARD_GRAVITY
 
 __all__ = ["drift_weight"]
@@ -29,16 +29,10 @@ def drift_weight(time: float, sources: ErrorSources, *, gravity: float = STANDAR
     gravity : float
         Magnitude of gravity, m/s².
     """
-
-    def of_bias(t: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.concatenate([position_from_alpha(t, 0.0, 0j, gravity), position_from_p(t, 0.0)], axis=-1)
-
     nodes, weights = np.polynomial.legendre.leggauss(8)  # exact for the polynomials at rest, up to t⁸ (degree 15)
     tau, width = 0.5 * time * (nodes + 1.0), 0.5 * time * weights
-    constant = of_bias(np.asarray(time))  # (3, 6)
-    # An impulse of alpha is a step of the rate, one of p a step of the velocity.
-    impulse = np.concatenate([position_from_rate(tau, 0.0, 0j, gravity), tau[:, None, None] * np.eye(3)], axis=-1)
-    step = of_bias(tau)  # (m, 3, 6)
+    constant = position_from_bias(time, 0.0, 0j, gravity)  # (3, 6)
+    impulse, step = (of(tau, 0.0, 0j, gravity) for of in (position_from_impulse, position_from_bias))  # (m, 3, 6)
     white = np.einsum("m,mij,mik->jk", width, impulse, impulse)
     walking = np.einsum("m,mij,mik->jk", width, step, step)
     return np.asarray(

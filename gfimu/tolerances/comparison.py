@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gfimu.short_repr import short_repr
 from gfimu.tolerances.budget import QuantityBudget
 
-__all__ = ["QUANTILES", "Comparison", "compare"]
+__all__ = ["DRAWS", "QUANTILES", "Comparison", "compare"]
 
 Floats = NDArray[np.float64]
 
@@ -26,7 +26,8 @@ designer reads off the figures."""
 _STANDARD_ERRORS = 3.0
 """Numerical: of the Monte Carlo; 0.3 % of right predictions lie beyond."""
 
-_DRAWS = 20_000  # numerical: of the first-order map, for its quantiles
+DRAWS = 20_000
+"""Numerical: units drawn by the first-order map for its quantiles and its curve."""
 
 
 @dataclass(frozen=True)
@@ -92,7 +93,7 @@ def compare(budget: QuantityBudget, errors: Floats, shape: str) -> Comparison:
     rms = float(np.sqrt(np.mean(found**2))) if len(found) else float("nan")
     first = budget.rms
     ratio = rms / first if first > 0.0 else float("nan")
-    drawn = budget.draw(_DRAWS, shape, np.random.default_rng(0))
+    drawn = budget.draw(DRAWS, shape, np.random.default_rng(0))
     expected = drawn**2
     spread = 0.5 * float(expected.std()) / float(expected.mean()) if first > 0.0 else 0.0
     return Comparison(

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gfimu.files.atomic_file import atomic_path
 from gfimu.tolerances.budget import QUANTITIES, QuantityBudget, ToleranceBudget
+from gfimu.tolerances.comparison import DRAWS
 from gfimu.tolerances.tolerances import CAUSES
 from gfimu.visual.colours import (
     AFTER_ON_PAPER,
@@ -33,7 +34,6 @@ __all__ = ["tolerance_picture"]
 
 Floats = NDArray[np.float64]
 
-_DRAWS = 20_000  # numerical: of the first-order map, for its curve
 _LABELLED = 0.06  # share of a bar from which the cause is written into it
 _IN_KEY = 0.005  # share from which a cause is in the key: less is no wider than a line
 
@@ -95,7 +95,7 @@ def _distributions(
     ends: list[float] = []
     for number, (calibration, one) in enumerate(quantities.items()):
         colour = _LINES[number % len(_LINES)]
-        curves = [(np.sort(one.draw(_DRAWS, shape, np.random.default_rng(0))), "--")]
+        curves = [(np.sort(one.draw(DRAWS, shape, np.random.default_rng(0))), "--")]
         if calibration in simulated:
             found = simulated[calibration]
             curves.append((np.sort(found[np.isfinite(found)]), "-"))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gfimu.tolerances.budget import QuantityBudget
 from gfimu.tolerances.tolerances import Tolerances
-from gfimu.units import STANDARD_GRAVITY
+from gfimu.units import MILLI_G
 
 __all__ = ["pay_for", "room_for", "stated_tolerances", "tolerance_figures"]
 
@@ -28,16 +28,15 @@ _OF_CHIP = {
 
 def stated_tolerances(tolerances: Tolerances) -> Iterator[tuple[str, str, str]]:
     """Yield each cause with its size in the field's unit, and where the size is from."""
-    milli_g = 1e-3 * STANDARD_GRAVITY
     machined = "limits, uniform between them" if tolerances.shape == "uniform" else "limits at 3 σ, normal"
     yield "placement", f"±{1e3 * tolerances.placement_m:.3g} mm", f"each chip and axis; {machined}"
     yield "angles", f"±{math.degrees(tolerances.angle_rad):.3g}°", f"each chip about each axis; {machined}"
     for cause, values, factor, unit in (
-        ("bias", tolerances.bias, milli_g, "mg"),
+        ("bias", tolerances.bias, MILLI_G, "mg"),
         ("gain", tolerances.gain, 0.01, "%"),
         ("cross-axis", tolerances.cross_axis, 0.01, "%"),
         ("nonlinearity", tolerances.nonlinearity, 0.01, "% of full scale"),
-        ("noise", tolerances.noise, milli_g, "mg per sample"),
+        ("noise", tolerances.noise, MILLI_G, "mg per sample"),
     ):
         sheet = "data sheet" if _OF_CHIP[cause] in tolerances.from_data_sheet else "as given"
         yield cause, f"{_span(values / factor)} {unit}", f"1 σ, {sheet}"

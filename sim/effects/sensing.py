@@ -9,7 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from gfimu.geometry.array import AccelerometerArray
-from gfimu.units import RATIO, STANDARD_GRAVITY
+from gfimu.units import MILLI_G, RATIO, STANDARD_GRAVITY
 from sim.effects.base import LARGEST_TURN, Effect, Pattern, Size, channel_patterns
 from sim.effects.low_pass import low_pass, mass_on_spring
 from sim.effects.scans import tone_shapes
@@ -32,7 +32,6 @@ __all__ = [
 ]
 
 _REFERENCE_TEMPERATURE = 25.0
-_MG = STANDARD_GRAVITY / 1000.0
 
 
 def _with_step(world: World, step: SensingStep) -> World:
@@ -73,9 +72,9 @@ class Bias(_PerChannel):
     summary = "a bias: a constant offset per channel"
     suffix = "_m_s2"
     unit = "m/s²"
-    tolerance = 0.3 * _MG
+    tolerance = 0.3 * MILLI_G
     of_pose = True
-    prior_std = 20 * _MG
+    prior_std = 20 * MILLI_G
     bound = STANDARD_GRAVITY  # four times the 0.25 g that the ADXL345's data sheet allows along z
     separated_by = "static poses on several sides (six-position), or the array remounted on its side"
 
@@ -134,7 +133,7 @@ class BiasTemperature(_PerChannel):
     unit = "m/s²/K"
     needs_temperature = True
     alike_by_lot = True
-    prior_std = 0.8 * _MG
+    prior_std = 0.8 * MILLI_G
     separated_by = "a run in which the temperature changes while the motion does not"
 
     def apply(self, world: World) -> World:
@@ -153,7 +152,7 @@ class WarmUp(_PerChannel):
     summary = "biases settle exponentially after turn-on (warm-up)"
     suffix = "_m_s2"
     unit = "m/s²"
-    prior_std = 10 * _MG
+    prior_std = 10 * MILLI_G
     alike_by_lot = True
     of_one_recording = True
     shape_limits: ClassVar = {"time_constant_s": (1.0, 1e5)}
@@ -202,7 +201,7 @@ class VibrationRectification(_PerChannel):
     summary = "mean readings shift with vibration, about as ω⁴"
     suffix = "_m_s2_per_rad4_s4"
     unit = "m/s²/(rad/s)⁴"
-    prior_std = 30 * _MG / 15.0**4
+    prior_std = 30 * MILLI_G / 15.0**4
     separated_by = "several speeds with and without vibration isolation"
 
     @classmethod
@@ -358,12 +357,12 @@ class Hysteresis(Effect):
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
         """One lost motion, common to all channels, never negative."""
-        return (Size("lost_m_s2", "m/s²", 5 * _MG, positive=True, step=0.5),)
+        return (Size("lost_m_s2", "m/s²", 5 * MILLI_G, positive=True, step=0.5),)
 
     @classmethod
     def shapes(cls, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:
         """Return half-widths of the play."""
-        return tuple({"width_m_s2": width * _MG} for width in (2.0, 10.0, 50.0, 200.0, 600.0))
+        return tuple({"width_m_s2": width * MILLI_G} for width in (2.0, 10.0, 50.0, 200.0, 600.0))
 
     def apply(self, world: World) -> World:
         """Add lost · (play − reading)/width, the play of half-width ``width_m_s2``."""
@@ -418,7 +417,7 @@ class InterferenceTone(Effect):
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
         """Sine and cosine amplitudes."""
-        return (Size("sine_m_s2", "m/s²", 2 * _MG), Size("cosine_m_s2", "m/s²", 2 * _MG))
+        return (Size("sine_m_s2", "m/s²", 2 * MILLI_G), Size("cosine_m_s2", "m/s²", 2 * MILLI_G))
 
     @classmethod
     def shapes(cls, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:

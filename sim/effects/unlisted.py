@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.geometry.array import AccelerometerArray
-from gfimu.units import STANDARD_GRAVITY
+from gfimu.units import MILLI_G, STANDARD_GRAVITY
 from gfimu.world_model import SpinState
 from sim.effects.base import LARGEST_TURN, Effect, Pattern, Size, channel_patterns
 from sim.effects.low_pass import low_pass
@@ -24,7 +24,6 @@ from sim.world import Lean, SampleContext, World
 __all__ = ["UNLISTED", "Dependence", "Unlisted"]
 
 _RATE, _ACCELERATION, _ANGLE, _KELVIN = 10.0, 20.0, 20.0, 3.0  # rad/s, rad/s², rad and K of an ordinary run
-_MG = STANDARD_GRAVITY / 1000.0
 _READ = {"rad": "rad", "rad_s": "rad/s", "rad2_s2": "rad²/s²", "rad3_s3": "rad³/s³", "rad_s2": "rad/s²"}
 """Units of keys as people read them."""
 
@@ -276,7 +275,7 @@ class _OfChannels(Unlisted):
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
         return tuple(
-            Size(cls.dependence.key(f"{channel}_m_s2"), cls.dependence.per("m/s²"), 5 * _MG / cls.dependence.usual)
+            Size(cls.dependence.key(f"{channel}_m_s2"), cls.dependence.per("m/s²"), 5 * MILLI_G / cls.dependence.usual)
             for channel in array.channels
         )
 
@@ -349,7 +348,7 @@ class LaggedTemperature(_OfChannels):
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
         """One coefficient per channel, as `BiasTemperature` has."""
-        return tuple(Size(f"{channel}_m_s2_K", "m/s²/K", 0.8 * _MG) for channel in array.channels)
+        return tuple(Size(f"{channel}_m_s2_K", "m/s²/K", 0.8 * MILLI_G) for channel in array.channels)
 
     @classmethod
     def shapes(cls, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:

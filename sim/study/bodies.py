@@ -15,7 +15,7 @@ import numpy as np
 from gfimu.errors import InputError
 from gfimu.files.model_files import find_model, read_toml
 from gfimu.recording import Recording
-from gfimu.units import STANDARD_GRAVITY
+from gfimu.units import MILLI_G
 from sim.campaign import discrete_parameters
 from sim.effects import BODY_EFFECTS, Effect, make_effect
 from sim.scenarios import Scenario, simulate
@@ -26,7 +26,6 @@ __all__ = ["body_twin", "draw_body"]
 
 GYRO_NOISE = 0.002
 """White noise of the reference gyro, rad/s: that of the scenario ``tumble``."""
-_MG = STANDARD_GRAVITY / 1000.0
 _CLOSE = 0.02
 _GYRO = tuple(f"gyro_{axis}_rad_s" for axis in "xyz")
 
@@ -65,7 +64,7 @@ def draw_body(case: Case) -> tuple[Recording, tuple[Effect, ...], float]:
 def _scenario(case: Case, rng: np.random.Generator) -> dict[str, Any]:
     data = copy.deepcopy(dict(read_toml(find_model("scenarios", "tumble"))))
     data |= {"array": case.array, "duration_s": case.duration, "sample_rate_hz": case.sample_rate}
-    data["sensor"] = {"errors": False, "bandwidth": False, "bias_instability_m_s2": case.bias_instability_mg * _MG}
+    data["sensor"] = {"errors": False, "bandwidth": False, "bias_instability_m_s2": case.bias_instability_mg * MILLI_G}
     data["motion"] = {
         **data["motion"],
         "rate_rad_s": float(rng.uniform(6.0, 18.0)),

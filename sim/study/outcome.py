@@ -21,7 +21,7 @@ from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
 from gfimu.short_repr import short_repr
-from gfimu.units import STANDARD_GRAVITY
+from gfimu.units import MILLI_G
 from sim.campaign import Measurement, detectability, hidden_effect, measure, random_profile
 from sim.effects import Effect, make_effect
 from sim.motion import SpinMotion
@@ -31,7 +31,6 @@ from sim.twin import Twin
 
 __all__ = ["HiddenWorld", "SmallerLibrary", "draw_world", "load_generator", "outcome_of", "run_case"]
 
-_MG = STANDARD_GRAVITY / 1000.0
 _TURN = 2 * np.pi
 _SHAPES = frozenset(("frequency_hz", "damping_ratio", "order", "width_m_s2", "time_constant_s"))
 _CLIPPED_ABOVE = 1.07
@@ -77,7 +76,7 @@ class SmallerLibrary(Twin):
 
 def calibration_residue(rng: np.random.Generator, array: AccelerometerArray) -> list[Effect]:
     """Draw what a good calibration leaves: bias 0.3 mg, scale 5e-4, misalignment 0.02°, position 0.05 mm."""
-    stds = {"bias": 0.3 * _MG, "scale_factor": 5e-4, "misalignment": np.deg2rad(0.02), "sensor_position": 5e-5}
+    stds = {"bias": 0.3 * MILLI_G, "scale_factor": 5e-4, "misalignment": np.deg2rad(0.02), "sensor_position": 5e-5}
     residue = []
     for name, std in stds.items():
         keys = make_effect(name).parameter_keys(array)
@@ -112,7 +111,7 @@ def draw_world(case: Case, source: str = "") -> HiddenWorld:
     setting = Measurement(
         case.duration,
         case.sample_rate,
-        case.bias_instability_mg * _MG,
+        case.bias_instability_mg * MILLI_G,
         case.tacho_noise,
         encoder_step=_TURN / case.encoder_counts if case.encoder_counts else 0.0,
     )
@@ -188,7 +187,7 @@ def _foreign_world(case: Case, twin: Twin, source: str) -> HiddenWorld:
         case.size,
         duration=case.duration,
         sample_rate=case.sample_rate,
-        bias_instability_m_s2=case.bias_instability_mg * _MG,
+        bias_instability_m_s2=case.bias_instability_mg * MILLI_G,
         tacho_noise_rad_s=case.tacho_noise,
     )
     columns = {name: np.asarray(values) for name, values in run.columns.items()}
