@@ -74,6 +74,7 @@ class WorldFactory:
     twin: Twin
     setting: Measurement = field(default_factory=Measurement)
 
+    # Cached properties that do not depend on what `with_noise` changes.
     _NOT_OF_NOISE: ClassVar = (
         *("_t", "_fine", "_stride", "_first", "_taps", "_world", "_geometry", "_quantum", "_white", "_shape"),
         "_metadata",

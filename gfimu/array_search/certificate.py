@@ -48,6 +48,7 @@ __all__ = ["Certificate", "certify"]
 _Vector = NDArray[np.float64]
 
 _ROUNDS, _STEPS = 100, 60  # numerical: of the search of H; any H gives a bound that holds
+_FRESH_WEIGHT = 0.3  # numerical: of all weight, given to the points that a round adds
 _LEAST_WEIGHT = 1e-7  # numerical: of a support point that is kept
 _CLOSE = 1e-7  # numerical: relative gap at which the search of H ends
 _PATIENCE, _PROGRESS = 12, 1e-6  # numerical: it also ends after so many rounds that raise the bound by less than this
@@ -156,7 +157,8 @@ class _Atoms:
         if self.frames is not None:
             return np.asarray(self.frames @ self.arms)
         if not weights:
-            axes = LATTICE[:13] / np.linalg.norm(LATTICE[:13], axis=1, keepdims=True)
+            half = LATTICE[: len(LATTICE) // 2]  # one of each pair of opposite directions
+            axes = half / np.linalg.norm(half, axis=1, keepdims=True)
             frames = axes[:, None] if self.k == 1 else frames_across(axes)
             return np.concatenate([frame @ thinned for frame in frames])
         blocks = thinned @ np.sum(weights, axis=0) @ np.swapaxes(thinned, 1, 2)
@@ -173,9 +175,9 @@ def _trace_bound(atoms: _Atoms, criterion: TraceCriterion) -> float:
         added = atoms.support(pulled)
         if pulled and atoms.frames is not None:
             added = added[:0]  # a finite list is all there from the first round on
-        fresh = 0.3 / len(added) if len(share) and len(added) else 1.0 / max(len(added), 1)
+        fresh = _FRESH_WEIGHT / len(added) if len(share) and len(added) else 1.0 / max(len(added), 1)
         rows = np.concatenate([rows, added])
-        share = np.concatenate([share * (0.7 if len(added) else 1.0), np.full(len(added), fresh)])
+        share = np.concatenate([share * (1.0 - _FRESH_WEIGHT if len(added) else 1.0), np.full(len(added), fresh)])
         share /= share.sum()
         for _ in range(_STEPS):
             inverses = [_inverse(term, rows, share) for term in criterion.terms]

@@ -29,8 +29,6 @@ __all__ = [
     "KappaCriterion",
     "Term",
     "TraceCriterion",
-    "alpha_leakage",
-    "leakage_and_slope",
 ]
 
 _Vector = NDArray[np.float64]
@@ -40,8 +38,10 @@ _UPDATE_RIDGE = (
     1e-9  # numerical: the same for what is left without one chip, where a large figure would drown the gains
 )
 _FULL = 1e-9  # numerical: least 1 − leverage, so that a channel whose faults never show has a large figure
-_AGREE, _AGREE_ROUGHLY = 1e-6, 1e-3
-_SHARPER = 10.0  # numerical
+_LEAST_INFORMATION = 1e-30  # numerical: added where there is none at all
+_LEAST_VALUE = 1e-300  # numerical: whose logarithm is finite
+_AGREE, _AGREE_ROUGHLY = 1e-6, 1e-3  # relative: of a smooth figure, and of one with kinks, where a polish ends sooner
+_SHARPER = 10.0  # numerical: power of the norm over draws, over that inside a criterion
 
 
 class Criterion(Protocol):
@@ -87,12 +87,12 @@ class Term:
         """Inverse of the information, shape (..., q, q), with a small ridge."""
         q = information.shape[-1]
         ridge = _RIDGE * np.trace(information, axis1=-2, axis2=-1)[..., None, None] / q
-        return np.linalg.inv(information + (ridge + 1e-30) * np.eye(q) + np.diag(self.prior))
+        return np.linalg.inv(information + (ridge + _LEAST_INFORMATION) * np.eye(q) + np.diag(self.prior))
 
     def bounded_inverse(self, information: _Vector) -> _Vector:
         """Inverse of information that may be singular, positive definite in spite of rounding, shape (..., q, q)."""
         values, vectors = np.linalg.eigh(information + np.diag(self.prior))
-        least = _UPDATE_RIDGE * values.mean(axis=-1, keepdims=True) + 1e-30
+        least = _UPDATE_RIDGE * values.mean(axis=-1, keepdims=True) + _LEAST_INFORMATION
         return (vectors / np.maximum(values, least)[..., None, :]) @ np.swapaxes(vectors, -1, -2)
 
     def of_rows(self, rows: _Vector) -> _Vector:
@@ -141,7 +141,7 @@ class TraceCriterion:
             else:
                 less = np.trace(np.linalg.solve(np.eye(inner.shape[-1]) + inner, gain), axis1=-2, axis2=-1)
             total += np.einsum("ij,saji->sa", term.weight, inverse) - less
-        return 0.5 * np.log(np.maximum(total, 1e-300))
+        return 0.5 * np.log(np.maximum(total, _LEAST_VALUE))
 
     def steered(self, others: _Vector, arms: _Vector) -> tuple[_Vector, _Vector]:
         """Return the best direction of a single sensing axis at each of many places, in closed form.
@@ -170,7 +170,9 @@ class TraceCriterion:
         gains, vectors = np.linalg.eigh(lower @ gain @ np.swapaxes(lower, 1, 2))
         directions = np.einsum("mji,mj->mi", lower, vectors[:, :, -1])
         value = np.sum(term.weight * inverse) - gains[:, -1]
-        return 0.5 * np.log(np.maximum(value, 1e-300)), directions / np.linalg.norm(directions, axis=1, keepdims=True)
+        return 0.5 * np.log(np.maximum(value, _LEAST_VALUE)), directions / np.linalg.norm(
+            directions, axis=1, keepdims=True
+        )
 
 
 @dataclass(frozen=True)
@@ -185,7 +187,7 @@ class KappaCriterion:
 
     @staticmethod
     def _floor(values: Any) -> _Vector:
-        return np.maximum(values, _RIDGE * values.max(axis=-1, keepdims=True) + 1e-300)
+        return np.maximum(values, _RIDGE * values.max(axis=-1, keepdims=True) + _LEAST_VALUE)
 
     def exact(self, rows: _Vector) -> _Vector:
         """See `Criterion.exact`."""
@@ -315,27 +317,6 @@ class Goal:
 
 def _draws(drawn: bool) -> int | None:
     return None if drawn else 1
-
-
-def alpha_leakage(rows: _Vector) -> _Vector:
-    """Products of ω left in α by the linear solution S a, shape (18,), of rows of shape (c, 12)."""
-    inverse = np.linalg.pinv(rows[:, :6])
-    return np.asarray((inverse @ rows[:, 6:])[:3].ravel())
-
-
-def leakage_and_slope(rows: _Vector) -> tuple[float, _Vector]:
-    """Sum of the squares of `alpha_leakage`, and its gradient, shape (c, 12).
-
-    With L = M⁻¹N, M = JᵀJ and N = JᵀQ, the gradient of φ = ‖L_α‖² is B = M⁻¹ 2L_α by N and −(B Lᵀ + L Bᵀ)/2 by M.
-    """
-    kept, field = rows[:, :6], rows[:, 6:]
-    inverse = np.linalg.inv(kept.T @ kept + 1e-12 * np.eye(6))
-    leakage = inverse @ kept.T @ field
-    of_alpha = np.vstack([leakage[:3], np.zeros((3, 6))])
-    by_product = inverse @ (2.0 * of_alpha)
-    mixed = by_product @ leakage.T
-    slope = np.hstack([field @ by_product.T - kept @ (mixed + mixed.T), kept @ by_product])
-    return float(np.sum(of_alpha**2)), slope
 
 
 def _soft_max(values: _Vector, sharpness: float) -> tuple[_Vector, _Vector]:

@@ -10,20 +10,22 @@ import numpy as np
 import scipy.optimize
 from numpy.typing import NDArray
 
-from gfimu.array_search.criteria import Goal, alpha_leakage, leakage_and_slope
+from gfimu.array_search.criteria import Goal
 from gfimu.array_search.exchange import figure
 from gfimu.array_search.problem import Design, Problem, rows_of, slopes_by_design
 from gfimu.array_search.shapes import frames_across
 
-__all__ = ["feasible", "leakage_of", "polish"]
+__all__ = ["alpha_leakage", "feasible", "leakage_and_slope", "leaks", "polish"]
 
 _Vector = NDArray[np.float64]
 
 _SHARPNESS = (30.0, 300.0, 3000.0)  # numerical: powers of the ℓ_p norms one after the other, where a figure has kinks
-_LEAKAGE_WEIGHTS = (1.0, 1e2, 1e4, 1e6)
-_LEAKAGE_FREE = 1e-9
+_LEAKAGE_WEIGHTS = (1.0, 1e2, 1e4, 1e6)  # numerical: of the penalty for ω² in α, one after the other
+_LEAKAGE_FREE = 1e-9  # numerical: largest product of ω left in α of an array that counts as free of it
 _NEAR = 0.5  # of the unit: pairs of chips nearer than this, beyond the spacing, are watched during the polish
 _SLACK = 1e-7  # numerical: of the unit, by which a constraint may fail
+_SPACING_SLACK, _SPACING_ROUNDING = 1e-6, 1e-9  # numerical: relative, and of the unit, by which the spacing may fail
+_LONGEST = 2.0  # numerical: bound of each number of a direction, whose length is free
 _STEPS, _FEWEST_STEPS = 300, 30  # numerical: for up to `_MANY` variables, and for very many: a step costs their cube
 _MANY = 100
 _PRECISION = 1e-12  # numerical: of the logarithm of the figure
@@ -86,8 +88,8 @@ class _Variables:
             lower.append(np.tile(shape.centre - shape.half, n))
             upper.append(np.tile(shape.centre + shape.half, n))
         if self.problem.turns:
-            lower.append(np.full(3 * self.problem.n_chips, -2.0))
-            upper.append(np.full(3 * self.problem.n_chips, 2.0))
+            lower.append(np.full(3 * self.problem.n_chips, -_LONGEST))
+            upper.append(np.full(3 * self.problem.n_chips, _LONGEST))
         return scipy.optimize.Bounds(np.concatenate(lower), np.concatenate(upper))
 
 
@@ -142,12 +144,33 @@ def feasible(problem: Problem, design: Design) -> bool:
         return False
     first, second = np.triu_indices(problem.n_chips, 1)
     apart = np.linalg.norm(places[first] - places[second], axis=1)
-    return not len(apart) or bool(apart.min() >= problem.spacing * (1.0 - 1e-6) - 1e-9)
+    return not len(apart) or bool(apart.min() >= problem.spacing * (1.0 - _SPACING_SLACK) - _SPACING_ROUNDING)
 
 
-def leakage_of(design: Design) -> bool:
+def leaks(design: Design) -> bool:
     """Whether α = (S a)₁…₃ of a design holds products of ω."""
     return bool(np.abs(alpha_leakage(design.rows)).max() >= _LEAKAGE_FREE)
+
+
+def alpha_leakage(rows: _Vector) -> _Vector:
+    """Products of ω left in α by the linear solution S a, shape (18,), of rows of shape (c, 12)."""
+    inverse = np.linalg.pinv(rows[:, :6])
+    return np.asarray((inverse @ rows[:, 6:])[:3].ravel())
+
+
+def leakage_and_slope(rows: _Vector) -> tuple[float, _Vector]:
+    """Sum of the squares of `alpha_leakage`, and its gradient, shape (c, 12).
+
+    With L = M⁻¹N, M = JᵀJ and N = JᵀQ, the gradient of φ = ‖L_α‖² is B = M⁻¹ 2L_α by N and −(B Lᵀ + L Bᵀ)/2 by M.
+    """
+    kept, field = rows[:, :6], rows[:, 6:]
+    inverse = np.linalg.inv(kept.T @ kept + 1e-12 * np.eye(6))
+    leakage = inverse @ kept.T @ field
+    of_alpha = np.vstack([leakage[:3], np.zeros((3, 6))])
+    by_product = inverse @ (2.0 * of_alpha)
+    mixed = by_product @ leakage.T
+    slope = np.hstack([field @ by_product.T - kept @ (mixed + mixed.T), kept @ by_product])
+    return float(np.sum(of_alpha**2)), slope
 
 
 def _objective(variables: _Variables, goal: Goal, sharpness: float, weight: float) -> Any:

@@ -222,7 +222,8 @@ class Problem:
             return np.eye(3)[None]
         chosen = self.directions
         if chosen is None:
-            chosen = LATTICE[: len(LATTICE) // 2] / np.linalg.norm(LATTICE[: len(LATTICE) // 2], axis=1, keepdims=True)
+            half = LATTICE[: len(LATTICE) // 2]  # one of each pair of opposite directions
+            chosen = half / np.linalg.norm(half, axis=1, keepdims=True)
             return chosen[:, None] if self.axes_per_chip == 1 else frames_across(chosen)
         return _combinations(chosen, self.axes_per_chip, "directions")
 

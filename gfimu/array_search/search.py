@@ -20,7 +20,7 @@ from gfimu.array_search.certificate import Certificate, certify
 from gfimu.array_search.criteria import Goal
 from gfimu.array_search.exchange import exchange, figure
 from gfimu.array_search.objectives import Conditions, Objective, objective
-from gfimu.array_search.polish import feasible, leakage_of, polish
+from gfimu.array_search.polish import feasible, leaks, polish
 from gfimu.array_search.problem import Design, Problem
 from gfimu.array_search.shapes import box
 from gfimu.errors import GeometryError, InputError
@@ -41,6 +41,7 @@ _WORTH_A_POLISH = 0.01  # relative: an exchange that ends this much above the st
 _ENOUGH = 10  # starts that agree, after which no more are made
 _NEAR = 1e-3  # relative: starts that end this near the best are counted besides
 _UNSEEN = 1e-4  # singular value of J, lengths in units, below which a motion counts as not seen
+_ROUNDING_COST = 1e-6  # relative: of the figure, that rounded positions may cost
 _DIGITS = 6  # of positions in units, where rounding costs nothing
 
 
@@ -258,7 +259,7 @@ def best_design(
         given = also[number] if number < len(also) else None
         value, design = _one_start(problem, goal, given, rng, kicks)
         made += 1
-        if feasible(problem, design) and not (problem.non_recursive and leakage_of(design)):
+        if feasible(problem, design) and not (problem.non_recursive and leaks(design)):
             ends.append((value, design))
         if report is not None:
             report(made)
@@ -311,8 +312,8 @@ def _rounded(problem: Problem, goal: Goal, design: Design, value: float) -> Desi
     positions = np.round(design.positions, _DIGITS) + 0.0
     low, high = problem.shape.centre - problem.shape.half, problem.shape.centre + problem.shape.half
     tidy = Design(np.clip(positions, low, high), design.axes, design.site)
-    costs_nothing = figure(problem, goal, tidy) <= value + 1e-6
-    clean = not (problem.non_recursive and leakage_of(tidy))
+    costs_nothing = figure(problem, goal, tidy) <= value + _ROUNDING_COST
+    clean = not (problem.non_recursive and leaks(tidy))
     return tidy if costs_nothing and clean and feasible(problem, tidy) else design
 
 

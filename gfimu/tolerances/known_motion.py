@@ -19,6 +19,9 @@ Floats = NDArray[np.float64]
 LEVEL_SECONDS = 1.0
 """Time over which an estimate levels itself at the start (`gfimu.motion.estimation`), s."""
 
+_TURNING_SHARE = 0.5
+"""Share of the largest rate from which a sample counts as turning: there the null space shows ω well."""
+
 _REST_RATE, _REST_ACCELERATION = 1e-6, 1e-6  # numerical: rad/s and rad/s², of a table that stands still
 
 
@@ -86,7 +89,7 @@ class KnownMotion:
     def turning(self) -> NDArray[np.bool_]:
         """Samples at which the rate is at least half its largest, shape (n,)."""
         speed = np.linalg.norm(self.omega, axis=1)
-        return np.asarray((speed >= 0.5 * speed.max()) & (speed > _REST_RATE))
+        return np.asarray((speed >= _TURNING_SHARE * speed.max()) & (speed > _REST_RATE))
 
 
 def cross_matrix(vectors: Floats) -> Floats:

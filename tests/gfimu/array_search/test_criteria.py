@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.optimize import approx_fprime
 
-from gfimu.array_search.criteria import Goal, alpha_leakage, leakage_and_slope
+from gfimu.array_search.criteria import Goal
 from gfimu.array_search.exchange import drawn_rows, figure
 from gfimu.array_search.objectives import OBJECTIVES, Conditions, objective
-from gfimu.array_search.polish import _objective, _Variables
+from gfimu.array_search.polish import _objective, _Variables, alpha_leakage, leakage_and_slope
 from gfimu.array_search.problem import Design, Problem, Tolerance, rows_of, slopes_by_design
 from gfimu.array_search.shapes import box, frames_across
 from gfimu.bounds.sample import alpha_std, rate_bound
