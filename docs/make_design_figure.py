@@ -29,18 +29,7 @@ STRETCH = 5e-5  # s²/rad²: the arms are 1.1 % longer at 15 rad/s
 RUNS = 20
 GREY, ORANGE = "#7f7f7f", "#d95f02"
 
-plt.rcParams.update(
-    {
-        "figure.dpi": 90,
-        "font.size": 8,
-        "axes.grid": True,
-        "grid.alpha": 0.3,
-        "axes.spines.top": False,
-        "axes.spines.right": False,
-        "legend.frameon": False,
-        "lines.linewidth": 0.9,
-    }
-)
+plt.style.use(Path(__file__).with_name("figures.mplstyle"))
 
 
 def main(folder: Path) -> Path:

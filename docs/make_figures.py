@@ -34,18 +34,7 @@ GREY, ORANGE, BLUE, VIOLET = "#7f7f7f", "#d95f02", "#1f9bcf", "#7b5fc0"
 AXES = ("#d62728", "#2ca02c", "#1f77b4")
 RUNS = 200
 
-plt.rcParams.update(
-    {
-        "figure.dpi": 90,
-        "font.size": 8,
-        "axes.grid": True,
-        "grid.alpha": 0.3,
-        "axes.spines.top": False,
-        "axes.spines.right": False,
-        "legend.frameon": False,
-        "lines.linewidth": 0.9,
-    }
-)
+plt.style.use(Path(__file__).with_name("figures.mplstyle"))
 
 
 @dataclass(frozen=True)

@@ -24,18 +24,7 @@ GREY, ORANGE = "#7f7f7f", "#d95f02"
 STEADY = ((14.0, 18.0), (21.0, 25.0))  # s, at 2 and at 5 rad/s
 CRAWL = (3.0, 11.0)
 
-plt.rcParams.update(
-    {
-        "figure.dpi": 90,
-        "font.size": 8,
-        "axes.grid": True,
-        "grid.alpha": 0.3,
-        "axes.spines.top": False,
-        "axes.spines.right": False,
-        "legend.frameon": False,
-        "lines.linewidth": 0.9,
-    }
-)
+plt.style.use(Path(__file__).with_name("figures.mplstyle"))
 
 
 def main(folder: Path) -> Path:

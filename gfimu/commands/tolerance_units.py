@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from gfimu.errors import GfimuError
 from gfimu.tolerances.budget import QUANTITIES
+from gfimu.tolerances.calibrated import uses_poses, uses_rest
 
 if TYPE_CHECKING:
     from gfimu.geometry.array import AccelerometerArray
@@ -147,11 +148,11 @@ def _row(task: UnitTask, number: int, motion: KnownMotion, reference: Estimate) 
     unit = draw_unit(task.scenario.array, task.tolerances, drawing)
     run = unit.record(task.scenario, of_run, temperature=CALIBRATED_AT + task.tolerances.temperature_K)
     runs: dict[bool, Recording | str] = {False: run}
-    if any("poses" in calibration for calibration in task.calibrations):
+    if any(uses_poses(calibration) for calibration in task.calibrations):
         runs[True] = _corrected(task, unit, run, of_poses)
     found: _Row = {}
     for calibration in task.calibrations:
-        readings = runs["poses" in calibration]
+        readings = runs[uses_poses(calibration)]
         if isinstance(readings, str):
             found[calibration] = readings
             continue
@@ -183,7 +184,7 @@ def _errors(
 ) -> dict[str, float]:
     """Estimate a run and return the norms of its errors."""
     array = task.scenario.array
-    if "rest" in calibration:  # as `gfimu.motion.rest_bias`, with the rest known: to find it is no tolerance
+    if uses_rest(calibration):  # as `gfimu.motion.rest_bias`, with the rest known: to find it is no tolerance
         rest = slice(motion.rest)
         bias = run.readings[rest].mean(axis=0) - motion.readings(array)[rest].mean(axis=0)
         run = replace(run, readings=run.readings - bias)

@@ -29,7 +29,17 @@ from gfimu.tolerances.known_motion import KnownMotion
 from gfimu.tolerances.signatures import axis_pairs, signatures, turned_readings
 from gfimu.tolerances.tolerances import Tolerances
 
-__all__ = ["CALIBRATIONS", "LEAST_REST_S", "Poses", "Remaining", "calibrations_of", "check_calibration", "remaining"]
+__all__ = [
+    "CALIBRATIONS",
+    "LEAST_REST_S",
+    "Poses",
+    "Remaining",
+    "calibrations_of",
+    "check_calibration",
+    "remaining",
+    "uses_poses",
+    "uses_rest",
+]
 
 Floats = NDArray[np.float64]
 
@@ -96,6 +106,16 @@ class Remaining:
     __repr__ = short_repr
 
 
+def uses_rest(calibration: str) -> bool:
+    """Whether biases are read at the rest before the motion."""
+    return "rest" in calibration.split("+")
+
+
+def uses_poses(calibration: str) -> bool:
+    """Whether the chips are calibrated from static poses."""
+    return "poses" in calibration.split("+")
+
+
 def calibrations_of(array: AccelerometerArray, motion: KnownMotion) -> tuple[str, ...]:
     """Return the calibrations that an array and a motion allow."""
     return tuple(name for name in CALIBRATIONS if _refusal(name, array, motion) is None)
@@ -112,10 +132,10 @@ def check_calibration(calibration: str, array: AccelerometerArray, motion: Known
 
 def _refusal(calibration: str, array: AccelerometerArray, motion: KnownMotion) -> str | None:
     """Return why a calibration is not possible."""
-    if "rest" in calibration and motion.rest * motion.step < LEAST_REST_S:
+    if uses_rest(calibration) and motion.rest * motion.step < LEAST_REST_S:
         return f"the motion does not begin with {LEAST_REST_S:g} s of rest; use another scenario or calibration"
     triads = all(len(chip.axes) == 3 and np.allclose(chip.axes @ chip.axes.T, np.eye(3)) for chip in array.chips)
-    if "poses" in calibration and not triads:
+    if uses_poses(calibration) and not triads:
         return f"array {array.name!r} has chips without three orthogonal axes, which poses don't calibrate; use rest"
     return None
 
@@ -149,9 +169,9 @@ def remaining(
     """
     check_calibration(calibration, array, motion)
     found = dict(signatures(array, motion, tolerances))
-    if "poses" in calibration:
+    if uses_poses(calibration):
         found = _after_poses(found, array, motion, tolerances, poses)
-    rest = motion.rest if "rest" in calibration else 0
+    rest = motion.rest if uses_rest(calibration) else 0
     if rest:
         found = {name: columns - columns[:rest].mean(axis=0) for name, columns in found.items()}
     found = {name: columns for name, columns in found.items() if np.abs(columns).max() > _NEGLIGIBLE}
