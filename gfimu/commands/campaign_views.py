@@ -177,6 +177,6 @@ def _write_csv(path: str | Path, groups: Sequence[Group]) -> None:
     factors = list(groups[0].values) if groups else []
     with atomic_path(path) as part, Path(part).open("w", encoding="utf-8", newline="") as file:
         lines = writer(file, lineterminator="\n")
-        lines.writerow([*factors, "result", "cases", "failed", "q05", "median_or_share", "q95"])
+        lines.writerow([*factors, "result", "cases", "failed", "low", "median_or_share", "high"])
         for one in groups:
             lines.writerow([*one.values.values(), one.result, one.cases, one.failed, one.low, one.median, one.high])
