@@ -44,7 +44,9 @@ def estimate_case(case: Case) -> Mapping[str, float]:
 
     Factors: ``scenario``, ``method`` (of the angular rate), ``calibration`` (``none``; ``rest``: biases read at the
     first rest; ``poses``: a calibration from poses of the same chips), ``array``, ``part``, ``duration_s``,
-    ``sample_rate_hz``, and any key of the scenario file.
+    ``sample_rate_hz``, any key of the scenario file; ``EFFECT.KEY``, a parameter of an effect such as
+    ``table_tilt.x_rad``; ``EFFECT.std_UNIT``, the standard deviation by which all its sizes are drawn, such as
+    ``sensor_position.std_m``. Effects are there while poses are recorded, too.
 
     Returns
     -------
@@ -54,7 +56,7 @@ def estimate_case(case: Case) -> Mapping[str, float]:
     from gfimu.commands.estimate import estimate
     from sim.scenarios import simulate
 
-    scenario, method, calibration = _setting(case.values)
+    scenario, method, calibration = _setting(case)
     recording = simulate(scenario, seed=case.seed)
     found = estimate(
         recording,
@@ -131,17 +133,18 @@ def check_factors(plan: PlanFile, first: Case, source: str) -> None:
         elif plan.kind == "drive":
             DriveWork().check(first)
         else:
-            _setting(first.values)
+            _setting(first)
     except InputError as error:
         raise InputError(f"{source}: [factors]: {error}") from None
 
 
-def _setting(values: Mapping[str, Value]) -> tuple[Scenario, str, str]:
+def _setting(case: Case) -> tuple[Scenario, str, str]:
     """Return scenario, method and calibration of a case of `estimate_case`."""
+    from gfimu.commands.campaign_effects import drawn_effects, names_effect
     from gfimu.rate.registry import RATE_METHODS
     from sim.scenarios import Scenario
 
-    rest = dict(values)
+    rest = {key: value for key, value in case.values.items() if not names_effect(key)}
     name, method = str(rest.pop("scenario", _SCENARIO)), str(rest.pop("method", "smoother"))
     calibration = str(rest.pop("calibration", "none"))
     if method not in RATE_METHODS:
@@ -149,7 +152,10 @@ def _setting(values: Mapping[str, Value]) -> tuple[Scenario, str, str]:
     if calibration not in _CALIBRATIONS:
         raise unknown_name("calibration", calibration, _CALIBRATIONS)
     changes = [f"{_SHORT.get(key, key)}={_as_set(value)}" for key, value in rest.items()]
-    return Scenario.load(name, changes=changes), method, calibration
+    scenario = Scenario.load(name, changes=changes)
+    rng = np.random.default_rng([case.seed, 1])  # apart from the world's own chance
+    effects = drawn_effects(case.values, scenario.array, rng)
+    return replace(scenario, effects=scenario.effects + effects), method, calibration
 
 
 def _as_set(value: Value) -> str:

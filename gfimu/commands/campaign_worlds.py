@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.commands.campaign_effects import FORMS, drawn_effects, names_effect
 from gfimu.errors import GeometryError, InputError, unknown_name
-from gfimu.units import KEY_ENDINGS, STANDARD_GRAVITY
+from gfimu.units import STANDARD_GRAVITY
 from sim.campaign import Measurement, hidden_effect
-from sim.effects import EFFECTS, Effect, make_effect
+from sim.effects import EFFECTS, Effect
 from sim.factory import WorldFactory
 from sim.twin import Twin
 
 if TYPE_CHECKING:
-    from gfimu.geometry.array import AccelerometerArray
     from sim.sweep.design import Case
     from sim.sweep.plan import PlanFile, Value
 
@@ -30,7 +30,6 @@ _TWIN = "cube12_turntable"
 _MG = STANDARD_GRAVITY / 1000.0
 _UNKNOWNS = 12  # α, p and the six products of ω
 _OWN = ("twin", "duration_s", "sample_rate_hz", "bias_instability_mg", "tacho_noise_rad_s", "effect", "d_prime")
-_STD = "std"
 _D_PRIME = 10.0  # of a hidden effect where the plan says nothing: plain in the data, small to the eye
 
 
@@ -89,12 +88,10 @@ def measure_case(case: Case) -> Mapping[str, float]:
 def check_world_factors(plan: PlanFile, first: Case) -> None:
     """Raise `InputError` where a factor of kind ``measure`` is unknown, or the first case can't be set up."""
     for name in plan.factors:
-        effect, dot, _ = name.partition(".")
-        if dot:
-            if effect not in EFFECTS:
-                raise unknown_name("effect", effect, EFFECTS)
-        elif name not in _OWN:
-            raise unknown_name("factor of kind 'measure'", name, (*_OWN, "EFFECT.KEY", "EFFECT.std_UNIT"))
+        if "." in name and not names_effect(name):
+            raise unknown_name("effect", name.partition(".")[0], EFFECTS)
+        if "." not in name and name not in _OWN:
+            raise unknown_name("factor of kind 'measure'", name, (*_OWN, *FORMS))
     if "d_prime" in plan.factors and "effect" not in plan.factors:
         raise InputError("d_prime is the size of a hidden effect; give effect too")
     _world(first)
@@ -146,33 +143,7 @@ def _effects(case: Case, factory: WorldFactory) -> list[Effect]:
 
         size = _number(case.values, "d_prime", _D_PRIME)
         effects.append(hidden_effect(rng, twin, hidden, random_profile(rng, setting.duration), size, setting))
-    given: dict[str, dict[str, Value]] = {}
-    for name, value in case.values.items():
-        effect, dot, key = name.partition(".")
-        if dot:
-            given.setdefault(effect, {})[key] = value
-    for effect, parameters in given.items():
-        drawn = _drawn(effect, parameters, twin.array, rng)
-        effects.append(make_effect(effect, drawn, twin.array))
-    return effects
-
-
-def _drawn(
-    effect: str, parameters: Mapping[str, Value], array: AccelerometerArray, rng: np.random.Generator
-) -> dict[str, Value]:
-    """Return the parameters of an effect, its sizes drawn where their standard deviation is given."""
-    found = {key: value for key, value in parameters.items() if not key.startswith(_STD)}
-    sizes = EFFECTS[effect].sizes(array)
-    for key, value in parameters.items():
-        if key.startswith(_STD):
-            valid = {f"{_STD}_{KEY_ENDINGS.get(size.unit, size.unit)}" for size in sizes}
-            if valid != {key}:
-                raise InputError(
-                    f"{effect}.{key}: sizes of {effect} are drawn by {' or '.join(sorted(valid)) or 'none'}"
-                )
-            draws = float(value) * rng.standard_normal(len(sizes))
-            found |= {size.key: float(one) for size, one in zip(sizes, draws, strict=True)}
-    return found
+    return [*effects, *drawn_effects(case.values, twin.array, rng)]
 
 
 def _number(values: Mapping[str, Value], name: str, usual: float) -> float:

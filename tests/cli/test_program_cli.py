@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import typer
 
+import gfimu
 from gfimu.cli.app import program
 from gfimu.cli.command_list import COMMANDS
 from gfimu.geometry.array import AccelerometerArray
@@ -108,3 +109,8 @@ print(*(name for name in {HEAVY} if name in sys.modules), file=sys.stderr)
     assert done.stderr.strip() == ""
     assert "Usage: gfimu estimate" in done.stdout
     assert "--debug" in done.stdout
+
+
+def test_python_runs_the_package_as_the_program():
+    done = subprocess.run([sys.executable, "-m", "gfimu", "--version"], capture_output=True, text=True, check=True)
+    assert done.stdout.split()[-1] == gfimu.__version__
