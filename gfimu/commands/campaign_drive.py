@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -87,7 +88,7 @@ def _drive(case: Case) -> Drive:
     )
     if not scenario.driven:
         raise InputError(f"scenario {scenario.name!r}: its table is not driven; set drive.mode to driven or dcmotor")
-    place, attitude, tilt = (float(keys.get(name, 0.0)) for name in _DRAWN)
+    place, attitude, tilt = (_std(keys, name) for name in _DRAWN)
     rng = np.random.default_rng(case.seed)
     errors = rng.standard_normal(8)
     scenario = replace(
@@ -98,6 +99,13 @@ def _drive(case: Case) -> Drive:
     world = scenario.world
     world = world.changed(axis_rotvec=world.axis_rotvec + tilt * np.append(errors[6:], 0.0))
     return Drive(world, scenario.motion, scenario.duration, scenario.physics_step, scenario.motor)  # type: ignore[arg-type]
+
+
+def _std(values: Mapping[str, Value], name: str) -> float:
+    value = values.get(name, 0.0)
+    if isinstance(value, str | bool) or not 0.0 <= value < math.inf:
+        raise InputError(f"{name} = {value!r}: give a standard deviation of zero or above")
+    return float(value)
 
 
 def _results(drive: Drive, run: DrivenRun) -> dict[str, float]:

@@ -81,6 +81,8 @@ def test_seeds_draw_the_mounting():
     [
         ('scenario = ["paper_run"]', "'paper_run': its table is not driven; set drive.mode to driven or dcmotor"),
         ('"drive.motor.cogging_Nmm" = [1.0]', "unknown key 'cogging_Nmm'"),
+        ('mount_std_m = ["much"]', "mount_std_m = 'much': give a standard deviation of zero or above"),
+        ("tilt_std_rad = [-0.1]", "tilt_std_rad = -0.1: give"),
     ],
 )
 def test_a_plan_that_cannot_be_set_up_is_one_line(tmp_path, factor, message):
