@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gfimu.commands.campaign_drive import DriveWork
+from gfimu.commands.campaign_drive import DriveWork, as_toml
 from gfimu.errors import InputError, unknown_name
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from gfimu.recording import Recording
     from sim.scenarios import Scenario
     from sim.sweep.design import Case
-    from sim.sweep.plan import PlanFile, Value
+    from sim.sweep.plan import PlanFile
 
 __all__ = ["KINDS", "check_factors", "diagnose_case", "estimate_case", "measure_case"]
 
@@ -151,15 +151,11 @@ def _setting(case: Case) -> tuple[Scenario, str, str]:
         raise unknown_name("method", method, RATE_METHODS)
     if calibration not in _CALIBRATIONS:
         raise unknown_name("calibration", calibration, _CALIBRATIONS)
-    changes = [f"{_SHORT.get(key, key)}={_as_set(value)}" for key, value in rest.items()]
+    changes = [f"{_SHORT.get(key, key)}={as_toml(value)}" for key, value in rest.items()]
     scenario = Scenario.load(name, changes=changes)
     rng = np.random.default_rng([case.seed, 1])  # apart from the world's own chance
     effects = drawn_effects(case.values, scenario.array, rng)
     return replace(scenario, effects=scenario.effects + effects), method, calibration
-
-
-def _as_set(value: Value) -> str:
-    return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def _calibrated(scenario: Scenario, seed: int) -> Calibration:

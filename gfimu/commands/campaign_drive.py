@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from sim.sweep.design import Case
     from sim.sweep.plan import Value
 
-__all__ = ["DriveWork"]
+__all__ = ["DriveWork", "as_toml"]
 
 _SCENARIO = "motor_run"
 _LOG_STEP = 1e-3  # s between logged states: above the frequencies of cogging, below what memory minds
@@ -84,7 +84,7 @@ def _drive(case: Case) -> Drive:
     keys: dict[str, Value] = dict(case.values)
     scenario = Scenario.load(
         str(keys.pop("scenario", _SCENARIO)),
-        changes=[f"{key}={_as_toml(value)}" for key, value in keys.items() if key not in _DRAWN],
+        changes=[f"{key}={as_toml(value)}" for key, value in keys.items() if key not in _DRAWN],
     )
     if not scenario.driven:
         raise InputError(f"scenario {scenario.name!r}: its table is not driven; set drive.mode to driven or dcmotor")
@@ -129,5 +129,6 @@ def _results(drive: Drive, run: DrivenRun) -> dict[str, float]:
     }
 
 
-def _as_toml(value: Value) -> str:
+def as_toml(value: Value) -> str:
+    """Return the value of a factor as a change of a scenario file takes it."""
     return str(value).lower() if isinstance(value, bool) else str(value)

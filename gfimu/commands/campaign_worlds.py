@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from gfimu.commands.campaign_effects import FORMS, drawn_effects, names_effect
 from gfimu.errors import GeometryError, InputError, unknown_name
-from gfimu.units import STANDARD_GRAVITY
+from gfimu.units import MILLI_G
 from sim.campaign import Measurement, hidden_effect
 from sim.effects import EFFECTS, Effect
 from sim.factory import WorldFactory
@@ -27,7 +27,6 @@ __all__ = ["check_world_factors", "measure_case"]
 Floats = NDArray[np.float64]
 
 _TWIN = "cube12_turntable"
-_MG = STANDARD_GRAVITY / 1000.0
 _UNKNOWNS = 12  # α, p and the six products of ω
 _OWN = ("twin", "duration_s", "sample_rate_hz", "bias_instability_mg", "tacho_noise_rad_s", "effect", "d_prime")
 _D_PRIME = 10.0  # of a hidden effect where the plan says nothing: plain in the data, small to the eye
@@ -109,7 +108,7 @@ def _world(case: Case) -> tuple[_Solution, list[Effect]]:
         raise InputError(f"duration_s = {duration:g} at sample_rate_hz = {rate:g} has less than two samples")
     found = _solution(str(values.get("twin", _TWIN)), duration, rate)
     factory = found.factory.with_noise(
-        _level(values, "bias_instability_mg", setting.bias_instability / _MG) * _MG,
+        _level(values, "bias_instability_mg", setting.bias_instability / MILLI_G) * MILLI_G,
         _level(values, "tacho_noise_rad_s", setting.tacho_noise),
     )
     return replace(found, factory=factory), _effects(case, factory)
