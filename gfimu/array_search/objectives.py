@@ -18,6 +18,7 @@ from gfimu.parts.part import Part
 from gfimu.parts.part_file import PartFile
 from gfimu.position_drift import ErrorSources
 from gfimu.position_drift.weight import drift_weight
+from gfimu.units import MILLI_G
 
 __all__ = ["OBJECTIVES", "WORST", "Conditions", "Objective", "objective"]
 
@@ -152,6 +153,7 @@ def objective(name: str, problem: Problem, conditions: Conditions) -> Objective:
             "use more chips or more axes"
         )
     meaning, unit, make = OBJECTIVES[plain]
+    meaning = meaning.format(bias_mg=conditions.sources.bias / MILLI_G if plain == "drift" else 0.0, given=conditions)
     worst = ", worst over the tolerances" if plain != name else ""
     return Objective(name, meaning + worst, unit, make(problem, conditions))
 
@@ -217,10 +219,18 @@ OBJECTIVES: dict[str, tuple[str, str, Callable[[Problem, Conditions], Criterion]
     "gdop": ("GDOP", "", _gdop),
     "gdop_joint": ("GDOP*, the angular rate unknown", "", _gdop_joint),
     "kappa": ("condition number κ(J)", "", _kappa),
-    "sigma_alpha": ("σ of α, root mean square of its components", "rad/s²", _sigma_alpha),
-    "sigma_p": ("σ of p, root mean square of its components", "m/s²", _sigma_p),
-    "rate": ("bound of the rate error, root mean square of its components", "rad/s", _rate),
-    "drift": ("position drift of first order at rest", "m", _drift),
-    "fault": ("least fault of the worst channel that is seen", "m/s²", _fault),
+    "sigma_alpha": ("σ of α, rms of its components", "rad/s²", _sigma_alpha),
+    "sigma_p": ("σ of p, rms of its components", "m/s²", _sigma_p),
+    "rate": (
+        "bound of the rate error at {given.speed_rad_s:.3g} rad/s, rms of its components",
+        "rad/s",
+        _rate,
+    ),
+    "drift": (
+        "first-order position drift after {given.time_s:g} s at rest, biases of {bias_mg:.3g} mg",
+        "m",
+        _drift,
+    ),
+    "fault": ("least fault of the worst channel that is seen within {given.fault_time_s:g} s", "m/s²", _fault),
 }
-"""Objectives: meaning, unit and how each becomes a criterion."""
+"""Objectives: meaning (a format of the conditions), unit and how each becomes a criterion."""
