@@ -60,8 +60,12 @@ def _run(
         Path | None, typer.Option("--out", help="Folder to write; one that was begun is gone on with.")
     ] = None,
     by: ByOption = None,
-    workers: Annotated[int | None, typer.Option("--workers", help="Processes; by default one per processor.")] = None,
-    cluster: Annotated[str, typer.Option("--cluster", help="Dask scheduler instead, such as tcp://host:8786.")] = "",
+    workers: Annotated[
+        int | None, typer.Option("--workers", help="Processes, or jobs of slurm; by default one per processor.")
+    ] = None,
+    cluster: Annotated[
+        str, typer.Option("--cluster", help="Dask scheduler instead, such as tcp://host:8786, or slurm.")
+    ] = "",
     json: JsonOption = False,
 ) -> None:
     """Run the cases of a plan that the folder lacks, and summarise them; or summarise a folder.

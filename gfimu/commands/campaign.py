@@ -72,9 +72,10 @@ def campaign(
     by : sequence of str
         Factors by whose values the results are grouped; all that are lists of values by default.
     workers : int, optional
-        Worker processes; by default as many as this process has processors.
+        Worker processes, or jobs of Slurm; by default as many as this process has processors.
     cluster : str
-        Address of a Dask scheduler, such as ``tcp://host:8786``, in place of processes of this machine.
+        Address of a Dask scheduler, such as ``tcp://host:8786``, or ``slurm`` for jobs, in place of processes of this
+        machine.
     progress : callable, optional
         Called with the number of cases that are done and of all.
 
@@ -94,7 +95,7 @@ def campaign(
     from sim.sweep.dataset import Dataset
     from sim.sweep.design import Design
     from sim.sweep.engine import run_campaign
-    from sim.sweep.executors import open_workers, processors
+    from sim.sweep.executors import check_cluster, open_workers, processors
     from sim.sweep.plan import load_plan
     from sim.sweep.summary import failures, grouped
 
@@ -109,10 +110,8 @@ def campaign(
         check_factors(found, Design(found)[0], str(plan))
         if out is None:
             raise InputError(f"{plan}: give the folder of the campaign with --out")
+        check_cluster(cluster)  # one that is not there is reported before anything is written
         opened = partial(open_workers, workers or processors(), cluster)
-        if cluster:
-            with opened():  # one that is not there is said before anything is written
-                pass
         dataset = Dataset.create(out, plan)
         run_campaign(dataset, KINDS[found.kind], opened, progress=progress)
     table = dataset.table()

@@ -26,17 +26,22 @@ _ASK = 1.0  # numerical: s between questions for the number of workers
 
 
 @contextmanager
-def open_cluster(address: str) -> Iterator[Workers]:
-    """Open the workers of a cluster by the address of its scheduler, such as ``tcp://host:8786``.
+def open_cluster(address: str, remedy: str = "start some with: dask worker ADDRESS") -> Iterator[Workers]:
+    """Open the workers of a cluster by the address of its scheduler; what is queued is cancelled in the end.
 
-    What is queued is cancelled when the campaign ends.
+    Parameters
+    ----------
+    address : str
+        Such as ``tcp://host:8786``.
+    remedy : str
+        What a warning advises where the cluster has no workers yet; ADDRESS stands for the address.
 
     Raises
     ------
     InputError
         If Dask is not installed, or no scheduler answers.
     """
-    client = _client(address)
+    client = _client(address, remedy.replace("ADDRESS", address))
     executor = _ClusterExecutor(client)
     log = logging.getLogger("distributed.client")
     level = log.level
@@ -95,7 +100,7 @@ class _Call:
         return self._reduced
 
 
-def _client(address: str) -> Client:
+def _client(address: str, remedy: str) -> Client:
     try:
         from distributed import Client, rpc
     except ImportError:
@@ -118,8 +123,8 @@ def _client(address: str) -> Client:
         raise InputError(f"--cluster {address}: is a Dask {kind.lower()}; give the address of the scheduler")
     client = Client(address, timeout=_CONNECT, set_as_default=False)
     if not client.nthreads():
-        text = f"--cluster {address}: has no workers yet, the campaign waits for them; start some with: dask worker"
-        warnings.warn(f"{text} {address}", RecordingWarning, stacklevel=2)
+        text = f"--cluster {address}: has no workers yet, the campaign waits for them; {remedy}"
+        warnings.warn(text, RecordingWarning, stacklevel=2)
     return client
 
 

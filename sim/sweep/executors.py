@@ -1,4 +1,4 @@
-"""Executors of a campaign: a process pool of this machine, or the workers of a Dask cluster."""
+"""Executors of a campaign: a process pool of this machine, the workers of a Dask cluster, or jobs of Slurm."""
 
 from __future__ import annotations
 
@@ -8,8 +8,11 @@ from contextlib import AbstractContextManager
 from sim.sweep.cluster import open_cluster
 from sim.sweep.engine import Workers
 from sim.sweep.pool import open_pool
+from sim.sweep.slurm import check_slurm, open_slurm
 
-__all__ = ["open_workers", "processors"]
+__all__ = ["check_cluster", "open_workers", "processors"]
+
+_SLURM = "slurm"
 
 
 def processors() -> int:
@@ -18,11 +21,29 @@ def processors() -> int:
 
 
 def open_workers(count: int, cluster: str = "") -> AbstractContextManager[Workers]:
-    """Open so many processes, or the workers of a Dask cluster at an address such as ``tcp://host:8786``.
+    """Open so many processes, or the workers of a cluster.
+
+    Parameters
+    ----------
+    count : int
+        Processes of this machine, or jobs of Slurm.
+    cluster : str
+        Address of a Dask scheduler, such as ``tcp://host:8786``; ``slurm`` for jobs of Slurm.
 
     Raises
     ------
     GfimuError
         If no worker can start, or no scheduler answers.
     """
+    if cluster == _SLURM:
+        return open_slurm(count)
     return open_cluster(cluster) if cluster else open_pool(count)
+
+
+def check_cluster(cluster: str) -> None:
+    """Raise `InputError` if a cluster, as `open_workers` takes it, can't be used; nothing is run."""
+    if cluster == _SLURM:
+        check_slurm()
+    elif cluster:
+        with open_cluster(cluster):
+            pass

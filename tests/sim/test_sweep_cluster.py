@@ -7,15 +7,17 @@ import threading
 from collections import Counter
 from contextlib import contextmanager
 from functools import partial
+from pathlib import Path
 from types import ModuleType
 
 import pytest
 from sweep_cases import always_dies, counted, waits
 
-from gfimu.errors import GfimuError, InputError
+from gfimu.errors import GfimuError, InputError, RecordingWarning
 from sim.sweep.cluster import open_cluster
 from sim.sweep.dataset import Dataset
 from sim.sweep.engine import run_campaign
+from sim.sweep.executors import check_cluster, open_workers
 from sim.sweep.pool import open_pool
 
 dask = pytest.importorskip("dask")
@@ -37,6 +39,25 @@ def cluster(workers=2):
         n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
     ) as found:
         yield found
+
+
+@pytest.fixture
+def slurm(tmp_path, monkeypatch):
+    """Commands that submit and cancel jobs as Slurm's do, on this machine; returns the file of what they did."""
+    pytest.importorskip("dask_jobqueue")
+    tools, done = tmp_path / "tools", tmp_path / "jobs"
+    tools.mkdir()
+    (tools / "sbatch").write_text(
+        f'#!/bin/sh\nsetsid sh "$1" >/dev/null 2>&1 &\necho submitted $! >>{done}\necho Submitted batch job $!\n'
+    )
+    (tools / "scancel").write_text(f"#!/bin/sh\necho cancelled $1 >>{done}\nkill -- -$1\n")
+    for tool in tools.iterdir():
+        tool.chmod(0o755)
+    monkeypatch.setenv("PATH", str(tools), prepend=os.pathsep)
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent), prepend=os.pathsep)  # of the work, for the jobs
+    size = {"cores": 1, "processes": 1, "memory": "1GiB", "walltime": "00:10:00"}
+    with dask.config.set({f"jobqueue.slurm.{key}": value for key, value in size.items()}):
+        yield done
 
 
 @pytest.fixture
@@ -127,3 +148,24 @@ def test_work_that_no_worker_finds_is_one_line(ran, monkeypatch):
     with cluster(1) as found, pytest.raises(GfimuError, match=r"No module named 'only_here'.*same gfimu") as refused:
         ran("out", partial(open_cluster, found.scheduler_address), module.work)
     assert "\n" not in str(refused.value)
+
+
+def test_jobs_of_slurm_give_the_bytes_of_the_pool_and_are_cancelled(ran, slurm):
+    expected, *_ = ran("pool", partial(open_pool, 2))
+    with pytest.warns(RecordingWarning, match="squeue"):
+        found, times, _ = ran("slurm", partial(open_workers, 2, "slurm"))
+    assert found == expected
+    assert times == [1] * 36
+    did = [line.split() for line in slurm.read_text().splitlines()]
+    assert [what for what, _ in did] == ["submitted"] * 2 + ["cancelled"] * 2
+    assert {job for what, job in did if what == "submitted"} == {job for what, job in did if what == "cancelled"}
+
+
+def test_slurm_that_is_not_there_is_one_line(monkeypatch, slurm):
+    check_cluster("slurm")
+    assert not slurm.exists()  # nothing was submitted
+    with dask.config.set({"jobqueue.slurm.memory": None}), pytest.raises(InputError, match=r"jobqueue\.yaml"):
+        check_cluster("slurm")
+    monkeypatch.setenv("PATH", "/nowhere")
+    with pytest.raises(InputError, match="no sbatch here"):
+        check_cluster("slurm")
