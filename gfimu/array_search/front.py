@@ -182,10 +182,7 @@ def _weighed(
     last: tuple[Design, ...] = ()
     for number, weight in enumerate(_WEIGHTS):
         share = min(max(weight, _TIE), 1.0 - _TIE)
-        compromise = Goal((
-            (1.0 - share, first.criterion, first.is_worst),
-            (share, second.criterion, second.is_worst),
-        ))  # fmt: skip
+        compromise = Goal(first.sought(1.0 - share) + second.sought(share))
         end = best_design(
             problem,
             compromise,
@@ -215,7 +212,9 @@ def _stepped(
     found = []
     for number, (step, problem) in enumerate(steps):
         wanted = objective(name, problem, conditions)
-        end = best_design(problem, wanted.goal, rng, starts=starts, report=_part(report, number, len(steps), starts))
+        end = best_design(
+            problem, Goal(wanted.sought()), rng, starts=starts, report=_part(report, number, len(steps), starts)
+        )
         value = math.exp(figure(problem, wanted.goal, end.design))
         text = f"least {wanted.meaning} found for {problem.n_chips} chips in {problem.volume.name}"
         array = problem.array(end.design, "front", conditions.part, text)

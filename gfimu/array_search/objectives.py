@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,7 @@ WORST = "_worst"
 _Vector = NDArray[np.float64]
 
 _UNSEEN_PRIOR = 1e-8  # numerical: information on the products of ω, so that those no channel sees do no harm
+_SEEN_SHARE = 1e-6  # numerical: weight of the variances of all six motions beside the figure, so that all are seen
 _FEWEST_CHANNELS = {"gdop_joint": 9, "rate": 9, "fault": 7}  # six motions, and ω or a check besides
 
 
@@ -118,8 +119,21 @@ class Objective:
 
     @property
     def goal(self) -> Goal:
-        """The objective as what a search makes small."""
+        """The figure itself."""
         return Goal(((1.0, self.criterion, self.is_worst),))
+
+    def sought(self, share: float = 1.0) -> tuple[tuple[float, Criterion, bool], ...]:
+        """Return what a search makes small, with weight ``share``: the figure, and a little of all variances.
+
+        Several figures are least, or no larger, where a motion they don't ask for is not seen at all: σ of α without
+        p, and the least fault, whose leverages add up to the number of motions that are seen.
+        """
+        found = self.criterion
+        if isinstance(found, FaultCriterion):
+            return (share, found, self.is_worst), (share, _all_seen(), False)
+        if isinstance(found, TraceCriterion):
+            found = replace(found, terms=tuple(_with_all_motions(term) for term in found.terms))
+        return ((share, found, self.is_worst),)
 
 
 def objective(name: str, problem: Problem, conditions: Conditions) -> Objective:
@@ -145,7 +159,7 @@ def objective(name: str, problem: Problem, conditions: Conditions) -> Objective:
     if plain not in OBJECTIVES:
         raise unknown_name("objective", name, OBJECTIVES)
     if plain != name and problem.tolerance is None:
-        raise InputError(f"objective {name}: a worst case needs [tolerance] in the brief")
+        raise InputError(f"objective {name}: a worst case needs [tolerance] in a brief (gfimu new brief)")
     channels, fewest = problem.n_chips * problem.axes_per_chip, _FEWEST_CHANNELS.get(plain, 6)
     if channels < fewest:
         raise GeometryError(
@@ -156,6 +170,22 @@ def objective(name: str, problem: Problem, conditions: Conditions) -> Objective:
     meaning = meaning.format(bias_mg=conditions.sources.bias / MILLI_G if plain == "drift" else 0.0, given=conditions)
     worst = ", worst over the tolerances" if plain != name else ""
     return Objective(name, meaning + worst, unit, make(problem, conditions))
+
+
+def _with_all_motions(term: Term) -> Term:
+    """Return the term with a little weight on all six motions, unless it weighs all of them as it is."""
+    whole = float(np.trace(term.weight))
+    if np.linalg.eigvalsh(term.weight[:6, :6])[0] > _SEEN_SHARE * whole:
+        return term
+    little = np.diag([_SEEN_SHARE * whole] * 6 + [0.0] * (len(term.weight) - 6))
+    return replace(term, weight=term.weight + little)
+
+
+def _all_seen() -> TraceCriterion:
+    """Root of 1 + a little tr M⁻¹: next to 1, and large where a motion is not seen; the 1 is a seventh unknown."""
+    into = np.zeros((12, 7))
+    into[:6, :6] = np.eye(6)
+    return TraceCriterion((Term(into, np.diag([_SEEN_SHARE] * 6 + [1.0]), np.array([0.0] * 6 + [1.0])),))
 
 
 def _motion(problem: Problem, weight: _Vector) -> TraceCriterion:

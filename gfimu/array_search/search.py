@@ -186,7 +186,7 @@ def search(
         If an argument is out of range or the chips don't fit.
     """
     judged = problem if wanted.is_worst or problem.tolerance is None else replace(problem, tolerance=None)
-    found = best_design(judged, wanted.goal, rng, starts=starts, report=report)
+    found = best_design(judged, Goal(wanted.sought()), rng, starts=starts, report=report)
     n, k = problem.n_chips, problem.axes_per_chip
     condition = f"least {wanted.meaning} found" + (" with α free of ω²" if problem.non_recursive else "")
     description = f"{condition} for {n} chips of {k} axes in {problem.volume.name}"
@@ -254,23 +254,22 @@ def best_design(
     elif problem.n_chips > _MANY_CHIPS:
         kicks = 0
     ends: list[tuple[float, Design]] = []
+    blind: list[tuple[float, Design]] = []
     made = 0
     for number in range(starts + len(also)):
         given = also[number] if number < len(also) else None
         value, design = _one_start(problem, goal, given, rng, kicks)
         made += 1
         if feasible(problem, design) and not (problem.non_recursive and leaks(design)):
-            ends.append((value, design))
+            (blind if _sees_too_little(design) else ends).append((value, design))
         if report is not None:
             report(made)
         best = min((one for one, _ in ends), default=math.inf)
         if sum(one < best + goal.agreement for one, _ in ends) >= _ENOUGH:
             break
     if not ends:
-        raise _failure(problem, None)
+        raise _failure(problem, min(blind, key=lambda item: item[0])[1] if blind else None)
     best, design = min(ends, key=lambda item: item[0])
-    if _sees_too_little(design):
-        raise _failure(problem, design)
     agreeing, near = (sum(one < best + alike for one, _ in ends) for alike in (goal.agreement, _NEAR))
     return Found(_rounded(problem, goal, design, best), made, agreeing, near)
 
@@ -332,9 +331,11 @@ def _failure(problem: Problem, design: Design | None) -> GeometryError:
         rng = np.random.default_rng(0)
         design = problem.random_design(problem.candidates(rng), rng)
     try:
-        require_all_motions(problem.array(design, "of such chips", "adxl345", ""))
+        require_all_motions(problem.array(design, "the best found", "adxl345", ""), or_axis=False)
     except GeometryError as error:
-        return GeometryError(f"no geometry of {problem.n_chips} such chips in {where} sees all motions: {error}")
+        return GeometryError(
+            f"no geometry of {problem.n_chips} such chips in {where} was found that sees all motions: {error}"
+        )
     if problem.non_recursive:
         return GeometryError(
             f"no geometry of {problem.n_chips} such chips in {where} was found whose angular acceleration is free "

@@ -90,20 +90,21 @@ def plot(
 
 
 def print_groups(title: str, groups: Sequence[Group]) -> None:
-    """Print the quantiles of each result in a table of its own."""
+    """Print the quantiles of each result, or its share and the interval of that, in a table of its own."""
     print_text(title)
     factors = list(groups[0].values) if groups else []
     for result in dict.fromkeys(group.result for group in groups):
+        of_result = [group for group in groups if group.result == result]
+        heads = ("from", "share", "to (95 %)") if of_result[0].share else ("5 %", "median", "95 %")
         rows = [
             (
                 *(str(group.values[name]) for name in factors),
                 str(group.cases),
                 *(f"{value:.4g}" for value in (group.low, group.median, group.high)),
             )
-            for group in groups
-            if group.result == result
+            for group in of_result
         ]
-        print_table(result, (*factors, "cases", "5 %", "median or share", "95 %"), rows, left=len(factors))
+        print_table(result, (*factors, "cases", *heads), rows, left=len(factors))
 
 
 def print_failures(failures: dict[str, int]) -> None:

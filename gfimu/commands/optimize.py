@@ -114,6 +114,8 @@ def optimize(
 
     if (pareto is None) != (front is None):
         raise InputError("--pareto A B and --front DIR go together: the two objectives, and the folder of their front")
+    if most_chips is not None and "chips" not in (pareto or ()):
+        raise InputError("--most-chips is of a front over chips; give --pareto chips OBJECTIVE --front DIR too")
     if pareto is not None and (out is not None or picture is not None):
         raise InputError("a front has many arrays, which --front takes; leave out --out and --picture")
     number = n_chips if chips is None else chips
@@ -233,3 +235,7 @@ def _write_front(folder: Path, found: Front) -> None:
         write_text(folder / f"{point.array.name}.toml", point.array.to_toml())
     write_text(folder / "front.json", json.dumps(found.to_dict(), indent=2) + "\n")
     front_picture(folder / "front.png", found)
+    written = {f"{point.array.name}.toml" for point in found.points}
+    for file in folder.glob("front_[0-9][0-9].toml"):  # of the front that this one replaces, which had more points
+        if file.name not in written:
+            file.unlink()

@@ -203,7 +203,7 @@ def tolerance(
     if part is not None:
         drawn, name = drawn.with_part_file(part)
         drawn = drawn.with_part(name)
-    require_all_motions(drawn)
+    require_all_motions(drawn, or_axis=False)
     run, words = _run(drawn, scenario, time, rate)
     motion = known_motion_of(run)
     for name in calibrated:

@@ -214,6 +214,7 @@ def _explained(message: str, data: Any, kind: type[Table], source: str) -> Input
     if not isinstance(data, Mapping):
         return InputError(f"{source}: must be a table of keys and values, not {_short(data)}")
     reason, _, path = message.partition(" - at `$")
+    path, _, _ = path.partition("[...]")  # an entry of a table with keys of the user's, which msgspec does not name
     at = _Place(data, types.type_info(kind), source)
     steps = list(_STEP.finditer(path.rstrip("`")))
     of_table = _FIELD.match(reason)

@@ -61,8 +61,15 @@ def seeing_arrays() -> list[str]:
     return [name for name in list_models("arrays") if sees_all_motions(AccelerometerArray.load(name))]
 
 
-def require_all_motions(array: AccelerometerArray) -> None:
+def require_all_motions(array: AccelerometerArray, *, or_axis: bool = True) -> None:
     """Check that the array sees all six components of α and p.
+
+    Parameters
+    ----------
+    array : AccelerometerArray
+        The array.
+    or_axis : bool
+        Whether a known axis (``--axis``) is a remedy where the check is made.
 
     Raises
     ------
@@ -71,9 +78,10 @@ def require_all_motions(array: AccelerometerArray) -> None:
     """
     unseen = unseen_motions(array)
     if unseen:
+        axis = ", or give the axis about which alone it turns (--axis)" if or_axis else ""
         raise GeometryError(
             f"array {array.name!r} (rank {6 - len(unseen)} of 6, {array.n_channels} channels) can't see "
-            f"{'; '.join(unseen)}; add sensing axes that do, or give the axis about which alone it turns (--axis)"
+            f"{'; '.join(unseen)}; add sensing axes that do{axis}"
         )
 
 

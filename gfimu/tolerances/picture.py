@@ -29,12 +29,15 @@ mpl.use("Agg")
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 __all__ = ["tolerance_picture"]
 
 Floats = NDArray[np.float64]
 
 _LABELLED = 0.06  # share of a bar from which the cause is written into it
+_TICKS = 12  # numerical: most labels of an axis, which fit beside each other
+_NARROW = 5.0  # numerical: ratio of the ends of an axis, below which round numbers lie beside each other
 _IN_KEY = 0.005  # share from which a cause is in the key: less is no wider than a line
 
 _LINES: tuple[Colour, ...] = (BEFORE_ON_PAPER, NOISE_ON_PAPER, SPIN_AXIS_ON_PAPER, AFTER_ON_PAPER)
@@ -111,6 +114,11 @@ def _distributions(
         return
     axes.set_xscale("log")
     axes.set_xlim(min(ends) / 1.3, max(ends) * 1.3)
+    # Plain numbers: powers of ten alone leave an axis of less than a decade without any, or with some that overlap.
+    narrow = max(ends) < _NARROW * min(ends)
+    axes.xaxis.set_major_locator(MaxNLocator(5) if narrow else LogLocator(subs=(1.0, 2.0, 5.0), numticks=_TICKS))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.3g}"))
+    axes.xaxis.set_minor_formatter(NullFormatter())
     axes.set_ylim(0.0, 1.0)
     axes.set_yticks([0.0, 0.5, 0.95], ["0", "50 %", "95 %"])
     axes.axhline(0.95, color=css(PALE), lw=0.7, zorder=0)

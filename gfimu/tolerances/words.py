@@ -17,6 +17,8 @@ __all__ = ["pay_for", "room_for", "stated_tolerances", "tolerance_figures"]
 
 _WORTH = 0.02  # of the error: a tolerance whose half gains less is not worth a word
 
+_OVER = 10.0  # times a tolerance, beyond which first order says no more than that it does not matter
+
 _OF_CHIP = {
     "bias": "bias_m_s2",
     "gain": "gain",
@@ -72,7 +74,8 @@ def room_for(budget: QuantityBudget, tolerances: Tolerances) -> str:
         "angles": (math.degrees(tolerances.angle_rad), "°"),
     }
     found = [
-        f"{cause} ±{size * budget.allowance[cause]:.2g}{unit}"
+        f"{cause} {'±' if budget.allowance[cause] <= _OVER else 'over ±'}"
+        f"{size * min(budget.allowance[cause], _OVER):.2g}{unit}"
         for cause, (size, unit) in sizes.items()
         if cause in budget.by_cause
     ]

@@ -22,6 +22,9 @@ from sim.sweep.plan import PlanFile, load_plan
 __all__ = ["Dataset"]
 
 _PLAN = "plan.toml"
+_MOST_FILES = (
+    100_000  # of a folder: making and finding them takes seconds; with many more it takes longer than the runs
+)
 _FORMAT = 2  # of rows; another one makes other names
 
 
@@ -47,10 +50,16 @@ class Dataset:
         Raises
         ------
         InputError
-            If the folder holds another plan, or is a file.
+            If the folder holds another plan, or is a file, or the plan makes more files than a folder should have.
         """
         found, path = plan if isinstance(plan, PlanFile) else load_plan(plan), Path(folder)
         kept = path / _PLAN
+        cases = Design(found).points * found.repeats
+        if cases > _MOST_FILES * found.batch:
+            raise InputError(
+                f"{kept if isinstance(plan, PlanFile) else plan}: {cases} cases in batches of {found.batch} are more "
+                f"than {_MOST_FILES} files; use a larger batch, or several plans, each with its own seed and folder"
+            )
         if kept.exists() and load_plan(kept) != found:
             raise InputError(f"{path}: holds another plan; give another --out")
         if path.is_file():

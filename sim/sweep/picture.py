@@ -116,7 +116,8 @@ def _figure(title: str, table: pa.Table, design: Design, results: list[str], all
     left_out = [f"{all_results - len(results)} more results"] if all_results > len(results) else []
     if len(varying(design.plan)) > len(factors):
         left_out.append(f"{len(varying(design.plan)) - len(factors)} factors of less influence")
-    figure.suptitle(title + (f" (not drawn: {', '.join(left_out)})" if left_out else ""), fontsize=11)
+    between = "\n" if columns == 1 else " "  # one panel is narrower than a title
+    figure.suptitle(title + (f"{between}(not drawn: {', '.join(left_out)})" if left_out else ""), fontsize=11)
     grid = figure.subplots(len(results), columns, squeeze=False)
     for row, result in zip(grid, results, strict=True):
         values = numbers(table, result)
@@ -132,7 +133,7 @@ def _figure(title: str, table: pa.Table, design: Design, results: list[str], all
             row[0].set_ylabel(f"share of cases: {label(result)}" if truth else label(result))
         for axes in row[1 : len(factors)]:
             axes.sharey(row[0])
-            axes.tick_params(labelleft=False)
+            axes.tick_params(which="both", labelleft=False)
         if found:
             _draw_bars(row[-1], [one for one in found if one.result == result], shares.get(result))
     if any(np.isfinite(one.total) for one in found):

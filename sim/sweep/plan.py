@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import msgspec
 
@@ -62,7 +63,11 @@ def load_plan(path: str | Path) -> PlanFile:
     InputError
         If a key is wrong, a range is empty, or the design lacks or contradicts its number of points.
     """
-    plan = read(read_toml(Path(path)), PlanFile, str(path))
+    table = read_toml(Path(path))
+    if isinstance(table.get("factors"), dict):
+        for name, factor in table["factors"].items():
+            _check_form(f"{path}: [factors] {name}", factor)
+    plan = read(table, PlanFile, str(path))
     if not plan.factors:
         raise InputError(f"{path}: [factors] is empty; give at least one, such as scenario = ['paper_run']")
     for name, factor in plan.factors.items():
@@ -80,6 +85,16 @@ def load_plan(path: str | Path) -> PlanFile:
             f"{path}: points = {plan.points}: a Sobol sequence is even for powers of two; use {below} or {2 * below}"
         )
     return plan
+
+
+def _check_form(where: str, factor: Any) -> None:
+    """Check what a factor is made of, so that a message names it."""
+    if isinstance(factor, dict):
+        read(factor, RangeTable, where)
+    elif not isinstance(factor, list) or not factor or not all(isinstance(one, str | float | int) for one in factor):
+        raise InputError(f"{where} = {factor}: must be a list of values, such as [1, 2], or a table with low and high")
+    elif any(isinstance(one, float) and not math.isfinite(one) for one in factor):
+        raise InputError(f"{where} = {factor}: must be finite; leave out inf and nan")
 
 
 def _check_list(where: str, factor: list[Value]) -> None:

@@ -40,6 +40,8 @@ class Group:
     low, median, high : float
         Quantiles 5, 50 and 95 %; of results that are true or false, the share of true ones in ``median`` and its 95 %
         interval (Wilson).
+    share : bool
+        Whether the result is true or false.
     """
 
     values: dict[str, Value]
@@ -49,6 +51,7 @@ class Group:
     low: float
     median: float
     high: float
+    share: bool = False
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content for JSON."""
@@ -114,8 +117,9 @@ def grouped(table: pa.Table, plan: PlanFile, by: Sequence[str] = ()) -> list[Gro
             column = numbers(table, result)[rows]
             column = column[np.isfinite(column)]
             if len(column):
-                summary = share_of if pa.types.is_boolean(table.schema.field(result).type) else _quantiles
-                found.append(Group(named, result, len(column), int(failed[rows].sum()), *summary(column)))
+                share = pa.types.is_boolean(table.schema.field(result).type)
+                summary = share_of(column) if share else _quantiles(column)
+                found.append(Group(named, result, len(column), int(failed[rows].sum()), *summary, share))
     return found
 
 

@@ -211,3 +211,11 @@ def test_corrupt_values_are_one_line_and_no_end(gfimu_command, tmp_path):
         f"gfimu: warning: {tmp_path / 'run.csv'}: left out 2 corrupt values (a11 2), the first at line 5, "
         "column a11_m_s2: 1e+19\n"
     )
+
+
+@pytest.mark.parametrize("command", [("optimize", "--chips", "2"), ("tolerance", "wheel_pair")])
+def test_where_no_axis_can_be_given_none_is_proposed(gfimu_command, command):
+    result = gfimu_command(*command)
+    assert result.code == 2
+    assert "rank 5 of 6" in result.stderr
+    assert "--axis" not in result.stderr

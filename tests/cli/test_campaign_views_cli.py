@@ -211,3 +211,16 @@ if __name__ == "__main__":
     names = [file.name for file in (tmp_path / "out").iterdir()]
     assert len(names) > 1
     assert all(name == "plan.toml" or name.endswith(".parquet") for name in names)
+
+
+def test_a_share_is_not_called_a_median(capsys):
+    from gfimu.cli.campaign_views import print_groups
+    from sim.sweep.summary import Group
+
+    print_groups(
+        "out", [Group({}, "exact", 4, 0, 0.3, 0.75, 0.95, share=True), Group({}, "size_m", 4, 0, 1.0, 2.0, 3.0)]
+    )
+    of_share, of_size = capsys.readouterr().out.split("size_m")
+    assert "share" in of_share
+    assert "median" not in of_share
+    assert "median" in of_size

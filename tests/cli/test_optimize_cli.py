@@ -100,6 +100,13 @@ def test_sites_come_from_mjcf_and_array_files(gfimu_command, here, project_root)
     assert np.isclose(np.abs(axes).max(axis=-1), 1.0).all()
 
 
+def test_a_shorter_front_leaves_no_array_of_the_one_it_replaces(gfimu_command, here):
+    for most in (6, 5):
+        options = ("--restarts", 1, "--pareto", "chips", "gdop", "--front", "front")
+        assert gfimu_command("optimize", "--chips", 4, "--most-chips", most, *options).code == 0
+    assert sorted(file.name for file in (here / "front").glob("*.toml")) == ["front_01.toml", "front_02.toml"]
+
+
 def test_a_front_is_a_folder_of_arrays_with_a_picture(gfimu_command, here):
     result = gfimu_command(
         "optimize", "--chips", 4, "--most-chips", 6, "--restarts", 2, "--pareto", "chips", "gdop", "--front", "front"
@@ -139,6 +146,11 @@ def test_bad_sites_end_with_one_line(gfimu_command, here, csv, message):
         (["--chips", "4", "--objective", "gdop_worst"], "needs [tolerance]"),
         (["--chips", "4", "--pareto", "gdop", "kappa"], "go together"),
         (["--chips", "4", "--front", "x"], "go together"),
+        (["--chips", "4", "--most-chips", "6"], "give --pareto chips OBJECTIVE"),
+        (
+            ["--chips", "4", "--pareto", "gdop", "size", "--front", "x", "--most-chips", "6"],
+            "--most-chips is of a front",
+        ),
         (["--chips", "4", "--pareto", "gdop", "chips", "--front", "x", "--out", "y.toml"], "leave out --out"),
         (["--chips", "4", "--pareto", "gdop", "chips", "--front", "x", "--most-chips", "3"], "must exceed 4"),
         (["--chips", "4", "--box-m", "0.1", "nan", "0.1"], "three edges"),

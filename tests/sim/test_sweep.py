@@ -252,7 +252,12 @@ def test_results_are_grouped_by_factors(tmp_path):
         ("[factors.a]\nlow = 1.0\nhigh = 2.0\n", "levels"),
         ("[factors.a]\nlow = 2.0\nhigh = 1.0\nlevels = 2\n", "not below"),
         ('[factors.a]\nlow = -1.0\nhigh = 1.0\nlevels = 2\nscale = "log"\n', "no logarithm"),
-        ("[factors]\na = []\n", "a"),
+        ("[factors]\na = []\n", r"\[factors\] a = \[\]: must be a list of values"),
+        ("[factors]\na = 5\n", r"\[factors\] a = 5: must be a list of values"),
+        ("[factors]\na = [[1]]\n", r"\[factors\] a = \[\[1\]\]: must be a list of values"),
+        ("[factors]\na = [1.0, nan]\n", r"a = \[1.0, nan\]: must be finite"),
+        ("[factors.a]\nlow = 1.0\nhigh = 2.0\nlevels = 1\n", r"\[factors\] a: levels = 1 must be"),
+        ("[factors.a]\nlo = 1.0\n", "a: unknown key 'lo'; .* did you mean 'low'"),
         ("factor = 3\n", "factor"),
     ],
 )
@@ -274,3 +279,16 @@ def test_folders_of_others_are_left_alone(tmp_path):
         Dataset.create(tmp_path / "full", plan)
     with pytest.raises(InputError, match="no campaign"):
         Dataset.open(tmp_path / "full")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "repeats = 1000000000000000000000\n[factors]\na = [1]\n",
+        "[factors]\n" + "".join(f"a{number} = {list(range(20))}\n" for number in range(20)),
+    ],
+)
+def test_more_files_than_a_folder_can_have_are_refused_at_once(tmp_path, text):
+    with pytest.raises(InputError, match="use a larger batch"):
+        Dataset.create(tmp_path / "out", plan_file(tmp_path, text))
+    assert not (tmp_path / "out").exists()

@@ -161,3 +161,14 @@ def test_unknown_objectives_are_refused(name, message):
         objective(name, Problem(4, 3, CUBE), Conditions())
     with pytest.raises(InputError, match="position nan"):
         Tolerance(float("nan"))
+
+
+def test_a_figure_that_ignores_motions_still_gets_an_array_that_sees_them():
+    """σ of α is no larger without p, and the leverages add up to the number of motions that are seen."""
+    along_body = found(Problem(6, 1, cylinder(0.05, 0.1), directions=np.eye(3)), "sigma_alpha", starts=2)
+    assert along_body.score.condition_number < 100
+    # The face centres with axes along the body (structure P2 of the paper): σ of α is 0.7071 of the channels'.
+    assert along_body.value <= Conditions().noise * np.sqrt(0.5) / 0.05
+    seven = found(Problem(7, 1, CUBE), "fault", starts=1)
+    assert seven.score.condition_number < 1e4
+    assert seven.certificate.gap < 1e-3

@@ -10,7 +10,7 @@ import pytest
 import scipy.stats
 from tolerance_cases import ONLY, motion_of, only, poses, run_of
 
-from gfimu.commands.tolerance import _poses
+from gfimu.commands.tolerance import _poses, tolerance
 from gfimu.commands.tolerance_units import UnitTask, simulate_units, unit_rows
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
@@ -245,3 +245,10 @@ def test_data_sheets_and_what_is_given():
 def test_wrong_tolerances(wrong):
     with pytest.raises(InputError):
         usual(AccelerometerArray.load("cube12"), **wrong)
+
+
+def test_a_tolerance_that_does_not_matter_gets_no_absurd_limit():
+    """After poses the angles hardly matter; first order would allow thousands of degrees."""
+    result = tolerance("mimu4444", calibrated=["poses"], closed_form=True)
+    room = room_for(result.budgets["poses"].quantities["position"], result.tolerances)
+    assert room == "a tenth more at placement over ±2 mm or angles over ±5°"
