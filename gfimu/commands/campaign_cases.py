@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import warnings
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
+import msgspec
 import numpy as np
 
 from gfimu.commands.campaign_drive import DriveWork, as_toml
-from gfimu.errors import InputError, unknown_name
+from gfimu.errors import InputError, RecordingWarning, unknown_name
 
 if TYPE_CHECKING:
     from gfimu.calibration.result import Calibration
     from gfimu.recording import Recording
     from sim.scenarios import Scenario
+    from sim.study.cases import Case as StudyCase
     from sim.sweep.design import Case
-    from sim.sweep.plan import PlanFile
+    from sim.sweep.plan import PlanFile, Value
 
 __all__ = ["KINDS", "check_factors", "diagnose_case", "estimate_case", "measure_case"]
 
@@ -89,14 +93,10 @@ def diagnose_case(case: Case) -> Mapping[str, Any]:
         Verdict, names of the causes, whether exactly what is hidden was named, whether a wrong name was, and the share
         of excess removed.
     """
-    from sim.study.cases import Case as StudyCase
     from sim.study.outcome import run_case
     from sim.study.report import brief
 
-    values = {_OF_STUDY[name]: value for name, value in case.values.items()}
-    hidden = values.pop("effects", "none")
-    effects = () if hidden == "none" else (str(hidden),)
-    outcome = run_case(StudyCase("campaign", case.seed, effects, **values))  # type: ignore[arg-type]
+    outcome = run_case(_study_case(case))
     return {**brief(outcome), "share_of_excess_removed": outcome["share_of_excess_removed"]}
 
 
@@ -117,25 +117,84 @@ KINDS: dict[str, Callable[[Case], Mapping[str, Any]]] = {
 
 
 def check_factors(plan: PlanFile, first: Case, source: str) -> None:
-    """Raise `InputError` where the kind or a factor of a plan is unknown, or its first case can't be set up."""
+    """Raise `InputError` where the kind or a factor is unknown, or the first case can't be set up.
+
+    Warns of each other listed value with which no case can be set up: those cases will be rows with a failure.
+
+    Parameters
+    ----------
+    plan : PlanFile
+        The plan.
+    first : Case
+        Its first case.
+    source : str
+        Name of the plan, for the message.
+    """
     if plan.kind not in KINDS:
-        raise unknown_name("kind", plan.kind, KINDS)
+        raise InputError(f"{source}: {unknown_name('kind', plan.kind, KINDS)}")
+    try:
+        check = _check_of(plan, first)
+        check(first)
+        for name, value in _listed(plan):
+            error = _refusal(check, first, {name: value})
+            # A value that does not go with the first values of the others may go with a second one.
+            others = ((other, one) for other, one in _listed(plan) if other != name)
+            if error and all(_refusal(check, first, {name: value, other: one}) for other, one in others):
+                text = f"{source}: [factors]: every case with {name} = {value!r} will fail: {error}"
+                warnings.warn(text, RecordingWarning, stacklevel=2)
+    except InputError as error:
+        raise InputError(f"{source}: [factors]: {error}") from None
+
+
+def _check_of(plan: PlanFile, first: Case) -> Callable[[Case], object]:
+    """Return what sets a case up without running it; refuses unknown factors."""
     if plan.kind == "diagnose":
         for name in plan.factors:
             if name not in _OF_STUDY:
                 raise unknown_name("factor of kind 'diagnose'", name, _OF_STUDY)
-        return
-    try:
-        if plan.kind == "measure":
-            from gfimu.commands.campaign_worlds import check_world_factors
+        return _study_case
+    if plan.kind == "measure":
+        from gfimu.commands.campaign_worlds import check_world_factors
 
-            check_world_factors(plan, first)
-        elif plan.kind == "drive":
-            DriveWork().check(first)
-        else:
-            _setting(first)
+        return partial(check_world_factors, plan)
+    return DriveWork().check if plan.kind == "drive" else _setting
+
+
+def _listed(plan: PlanFile) -> Iterator[tuple[str, Value]]:
+    """Yield every listed value but the first of each factor, with its factor."""
+    for name, factor in plan.factors.items():
+        if isinstance(factor, list):
+            yield from ((name, value) for value in factor[1:])
+
+
+def _refusal(check: Callable[[Case], object], first: Case, changed: Mapping[str, Value]) -> InputError | None:
+    try:
+        check(replace(first, values={**first.values, **changed}))
     except InputError as error:
-        raise InputError(f"{source}: [factors]: {error}") from None
+        return error
+    return None
+
+
+def _study_case(case: Case) -> StudyCase:
+    """Return the hidden world of a case of `diagnose_case`."""
+    from gfimu.geometry.array import AccelerometerArray
+    from sim.effects import EFFECTS
+    from sim.study.cases import EXOTICS
+    from sim.study.cases import Case as StudyCase
+
+    values: dict[str, Any] = {_OF_STUDY[name]: value for name, value in case.values.items()}
+    hidden = values.pop("effects", "none")
+    if hidden not in {"none", *EFFECTS, *EXOTICS}:
+        raise unknown_name("effect", str(hidden), ("none", *EFFECTS, *EXOTICS))
+    if "array" in values:
+        AccelerometerArray.load(values["array"])
+    values["effects"] = () if hidden == "none" else (hidden,)
+    try:
+        return msgspec.convert({"study": "campaign", "seed": case.seed, **values}, StudyCase)
+    except msgspec.ValidationError as error:
+        what, _, field = str(error).partition(" - at `$.")
+        name = next((one for one, of_case in _OF_STUDY.items() if f"{of_case}`" == field), field)
+        raise InputError(f"{name}: {what}") from None
 
 
 def _setting(case: Case) -> tuple[Scenario, str, str]:

@@ -4,6 +4,8 @@ import json
 
 import pytest
 
+from gfimu.errors import RecordingWarning
+
 PLAN = """
 repeats = 1
 batch = 1
@@ -46,6 +48,8 @@ def test_a_plan_is_run_and_gone_on_with(gfimu_command, tmp_path):
         (PLAN.replace("sensor.range_g", "sensor.rnge_g"), "rnge_g"),
         ('kind = "dream"\n' + PLAN, "unknown kind 'dream'"),
         ('kind = "diagnose"\n[factors]\ncolour = ["red"]\n', "colour"),
+        ('kind = "diagnose"\n[factors]\neffect = ["bais"]\n', "unknown effect 'bais'"),
+        ('kind = "diagnose"\n[factors]\nduration_s = ["long"]\n', "duration_s: Expected `float`"),
     ],
 )
 def test_a_wrong_plan_is_one_line_and_writes_nothing(gfimu_command, tmp_path, text, message):
@@ -57,3 +61,33 @@ def test_a_wrong_plan_is_one_line_and_writes_nothing(gfimu_command, tmp_path, te
     assert result.stderr.count("\n") == 1
     assert not (tmp_path / "out").exists()
     assert gfimu_command("campaign", plan).code == 2
+
+
+def checked(folder, text):
+    from gfimu.commands.campaign_cases import check_factors
+    from sim.sweep.design import Design
+    from sim.sweep.plan import load_plan
+
+    (folder / "plan.toml").write_text(text)
+    plan = load_plan(folder / "plan.toml")
+    check_factors(plan, Design(plan)[0], "plan.toml")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('kind = "diagnose"\n[factors]\neffect = ["bias", "bais"]\n', "effect = 'bais' will fail: unknown effect"),
+        ('[factors]\nscenario = ["rest", "papr_run"]\n', "scenario = 'papr_run' will fail: unknown scenario"),
+        ('kind = "measure"\n[factors]\nduration_s = [6, -1]\n', "duration_s = -1 will fail"),
+        ('[factors]\npart = ["adxl345", "adxl355"]\n"sensor.range_g" = [16, 32]\n', "sensor.range_g = 32 will fail"),
+    ],
+)
+def test_values_of_which_every_case_will_fail_are_named_before_anything_runs(tmp_path, text, message):
+    with pytest.warns(RecordingWarning, match=message):
+        checked(tmp_path, text)
+
+
+def test_a_value_that_goes_with_some_others_only_is_no_warning(tmp_path, recwarn):
+    """An ADXL355 has no range of 16 g."""
+    checked(tmp_path, '[factors]\npart = ["adxl345", "adxl355"]\n"sensor.range_g" = [16, 8]\n')
+    assert not recwarn
