@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import json
 import os
 import sys
 import tempfile
@@ -17,6 +18,7 @@ from gfimu.errors import GfimuError, InputError
 __all__ = ["main", "program"]
 
 _DEBUG = "--debug"
+_JSON = "--json"
 _DEBUG_VARIABLE = "GFIMU_DEBUG"
 _LONGEST = 400  # characters of a foreign message
 _INTERRUPTED = 130  # what typer makes of Ctrl-C
@@ -65,10 +67,10 @@ def main() -> None:
     try:
         code = program()(prog_name="gfimu", standalone_mode=False)
         if code == _INTERRUPTED:
-            code = _say("interrupted", 1)
+            code = _report(KeyboardInterrupt(), debug=False, as_json=_JSON in arguments)
         sys.stdout.flush()  # a full disk or a closed pipe shows here at the latest
     except BaseException as error:  # noqa: BLE001  some libraries' own exceptions are no Exception
-        code = _report(error, debug=debug)
+        code = _report(error, debug=debug, as_json=_JSON in arguments)
     raise SystemExit(code or 0)
 
 
@@ -80,8 +82,8 @@ def _without_debug(arguments: list[str]) -> tuple[list[str], bool]:
     return kept + arguments[end:], asked
 
 
-def _report(error: BaseException, *, debug: bool) -> int:
-    """Print an error as one line, and where it came from if asked; return the exit code."""
+def _report(error: BaseException, *, debug: bool, as_json: bool) -> int:
+    """Print an error as one line, for machines as one object too, and where it came from if asked; return the code."""
     if isinstance(error, SystemExit):
         return error.code if isinstance(error.code, int) else int(error.code is not None)
     if debug:
@@ -89,23 +91,39 @@ def _report(error: BaseException, *, debug: bool) -> int:
     if isinstance(error, BrokenPipeError):
         _close_stdout()
         return 1
-    if isinstance(error, KeyboardInterrupt):
-        return _say("interrupted", 1)
-    if isinstance(error, InputError):
-        return _say(str(error), 2)
-    if isinstance(error, GfimuError):
-        return _say(str(error), 1)
-    if hasattr(error, "format_message"):  # a misspelt option or command
-        return _usage(error)
+    context = getattr(error, "ctx", None)
+    if type(error).__name__ == "NoArgsIsHelpError" and context is not None:
+        typer.echo(context.get_help())
+        return 2
+    text, code = _explained(error)
+    text = " ".join(text.split())  # one line, whatever line ends the text has
+    sys.stderr.write(f"gfimu: {text}\n")
     if isinstance(error, OSError):
         _close_stdout()
-        return _say(_of_system(error), 1)
+    elif as_json:
+        fault = {"kind": type(error).__name__, "message": text, "exit_code": code}
+        typer.echo(json.dumps({"error": fault}, indent=2, ensure_ascii=False))
+    return code
+
+
+def _explained(error: BaseException) -> tuple[str, int]:
+    """Return what an error says to a user, and the exit code."""
+    if isinstance(error, KeyboardInterrupt):
+        return "interrupted", 1
+    if isinstance(error, GfimuError):
+        return str(error), 2 if isinstance(error, InputError) else 1
+    if hasattr(error, "format_message"):  # a misspelt option or command
+        context = getattr(error, "ctx", None)
+        command = context.command_path if context is not None else "gfimu"
+        return f"{error.format_message().rstrip('.')}; see {command} --help", getattr(error, "exit_code", 2)
+    if isinstance(error, OSError):
+        return _of_system(error), 1
     if isinstance(error, MemoryError):
-        return _say("not enough memory; use a shorter recording or a machine with more", 1)
+        return "not enough memory; use a shorter recording or a machine with more", 1
     text = f"{type(error).__name__}: {error}"[:_LONGEST]
     file = _written(error)
     attached = f"the file {file}" if file else f"what the same command prints with {_DEBUG}"
-    return _say(f"unexpected {text}; please report it with {attached} ({_DEBUG} shows where it came from)", 1)
+    return f"unexpected {text}; please report it with {attached} ({_DEBUG} shows where it came from)", 1
 
 
 def _written(error: BaseException) -> str:
@@ -120,26 +138,10 @@ def _written(error: BaseException) -> str:
     return name
 
 
-def _say(text: str, code: int) -> int:
-    """Write one line to standard error, whatever line ends the text has."""
-    sys.stderr.write(f"gfimu: {' '.join(text.split())}\n")
-    return code
-
-
 def _of_system(error: OSError) -> str:
     """Return what the operating system refused, with the file if it is known."""
     what = error.strerror or str(error)
     return f"{error.filename}: {what}" if error.filename is not None else f"{what}; free space, or write elsewhere"
-
-
-def _usage(error: BaseException) -> int:
-    """Return the code of a wrong call after naming what was wrong with it."""
-    context = getattr(error, "ctx", None)
-    if type(error).__name__ == "NoArgsIsHelpError" and context is not None:
-        typer.echo(context.get_help())
-        return 2
-    command = context.command_path if context is not None else "gfimu"
-    return _say(f"{error.format_message().rstrip('.')}; see {command} --help", getattr(error, "exit_code", 2))  # type: ignore[attr-defined]
 
 
 def _close_stdout() -> None:

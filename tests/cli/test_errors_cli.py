@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import json
 import os
 import subprocess
 import sys
@@ -264,3 +265,22 @@ def test_a_progress_bar_takes_no_markup(capsys, monkeypatch):
     output.print_table("[/t]", ["[/h]"], [["[/c]"], [np.float64(1.5)]], note="[/n]")
     printed = capsys.readouterr().out
     assert all(text in printed for text in ("[/red]", "[/t]", "[/h]", "[/c]", "[/n]", "1.5"))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "kind", "message"),
+    [
+        (("score", "nope"), "InputError", "unknown array 'nope'"),
+        (("inspect", "nothing.csv"), "InputError", "nothing.csv: no such file"),
+        (("scor",), "UsageError", "No such command 'scor'"),
+        (("score", "one_chip", "--speed-rad-s", "fast"), "BadParameter", "Invalid value for '--speed-rad-s'"),
+    ],
+)
+def test_for_machines_an_error_is_an_object_too(gfimu_command, arguments, kind, message):
+    result = gfimu_command(*arguments, "--json")
+    assert result.code == 2
+    error = json.loads(result.stdout)["error"]
+    assert (error["kind"], error["exit_code"]) == (kind, 2)
+    assert message in error["message"]
+    assert result.stderr == f"gfimu: {error['message']}\n"
+    assert gfimu_command(*arguments).stdout == ""
