@@ -34,7 +34,7 @@ _D_PRIME = 10.0  # of a hidden effect where the plan says nothing: plain in the 
 
 @dataclass(frozen=True)
 class _Solution:
-    """Linear solution of an array, with the world that it believes in.
+    """Linear solution of an array, with the nominal world that it assumes.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def measure_case(case: Case) -> Mapping[str, float]:
     solution, effects = _world(case)
     made = solution.factory.world(np.random.default_rng(case.seed), effects)
     deviation, rate, t = made.recording.readings - made.ideal, made.motion.rate, made.recording.t_s
-    # The solution is linear: its error is that of the deviation from the world it believes in alone.
+    # The solution is linear: its error is that of the deviation from the nominal world alone.
     errors = deviation @ solution.inverse.T  # (n, 7)
     alpha, p, square = errors[:, :3], errors[:, 3:6], errors[:, 6]
     speed = np.sqrt(np.maximum(rate**2 + square, 0.0)) - np.abs(rate)

@@ -191,10 +191,10 @@ def test_what_was_run_by_a_simpler_method_says_so(tmp_path, monkeypatch):
 @pytest.mark.parametrize("verdict", ["nothing_found", "explained"])
 def test_only_a_miss_is_fitted_from_the_truth(tmp_path, monkeypatch, said, verdict):
     missed, other = study_cases("pairs", 2)
-    told = [{"effect": name, "rivals": []} for name in missed.effects]
-    said[0][missed.key] = {"verdict": verdict, "causes": told if verdict == "explained" else []}
-    told = [{"effect": name, "rivals": []} for name in other.effects]
-    said[0][other.key] = {"verdict": "explained", "causes": told}
+    causes = [{"effect": name, "rivals": []} for name in missed.effects]
+    said[0][missed.key] = {"verdict": verdict, "causes": causes if verdict == "explained" else []}
+    causes = [{"effect": name, "rivals": []} for name in other.effects]
+    said[0][other.key] = {"verdict": "explained", "causes": causes}
     monkeypatch.setattr(plan, "blame_of", lambda case, *_: {"blame": f"search of {case.key}"})
     _, outcomes = run(tmp_path / "run", monkeypatch, "pairs", "--blame")
     asked = f"search of {missed.key}" if verdict == "nothing_found" else None
@@ -206,9 +206,9 @@ def test_only_a_miss_is_fitted_from_the_truth(tmp_path, monkeypatch, said, verdi
 )
 def test_a_generator_that_is_not_there_is_one_line_before_anything_runs(tmp_path, source, words, capsys):
     assert main(["run", "singles", "--world", source, "--out", str(tmp_path / "run")]) == 2
-    told = capsys.readouterr().err
-    assert words in told
-    assert told.count("\n") == 1
+    printed = capsys.readouterr().err
+    assert words in printed
+    assert printed.count("\n") == 1
     assert not (tmp_path / "run").exists()
 
 
