@@ -4,7 +4,8 @@ Run ``python docs/scripts/compare_calibrations.py [FOLDER]``; it prints the tabl
 draws the histograms. The truth is a triad with a triangular sensitivity matrix, as the paper's model has it, so that no
 method suffers from the model. Six-position and recursive least squares get the six faces, each tilted by a levelling
 error; multi-position gets 18 poses of the same length with the same tilts, which it does not care about. The check is
-the paper's: RMS of |a| − g over rest poses that no calibration has seen."""
+the paper's: RMS of |a| − g over rest poses that no calibration has seen.
+"""
 
 from __future__ import annotations
 
