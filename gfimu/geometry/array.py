@@ -160,7 +160,7 @@ class AccelerometerArray:
 
     @cached_property
     def centripetal_matrix(self) -> NDArray[np.float64]:
-        """Matrix Q, shape (c, 6): Q s = θ_iᵀ (ωωᵀ − |ω|² I) r_i with s the products `OMEGA_PRODUCTS` of ω."""
+        """Matrix Q, shape (c, 6): ``Q s = θ_iᵀ (ωωᵀ − |ω|² I) r_i`` with s the products `OMEGA_PRODUCTS` of ω."""
         x, y, z = self.positions.T
         a, b, c = self.axes.T
         return np.column_stack(
