@@ -7,10 +7,12 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "docs" / "scripts")]
 
 import make_api_reference  # noqa: E402
+import make_cli_reference  # noqa: E402
 
 import gfimu  # noqa: E402
 
 make_api_reference.write_pages()
+make_cli_reference.write_pages()
 
 project = "gfimu"
 author = "The gfimu developers"
