@@ -37,6 +37,7 @@ myst_dmath_double_inline = True
 nb_execution_mode = "off"  # tests execute the notebooks
 
 # API: from docstrings in numpydoc form. Names in backticks link where they are documented.
+smartquotes = False  # an option keeps its two dashes
 highlight_language = "none"  # of blocks that name none: commands and their output
 default_role = "py:obj"
 autodoc_typehints = "none"
@@ -53,6 +54,7 @@ html_title = f"gfimu {version}"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
 html_show_sourcelink = False
+html_show_search_summary = False  # summaries are fetched, which browsers refuse for files
 html_copy_source = False
 copybutton_prompt_text = "$ "
 copybutton_only_copy_prompt_lines = True
