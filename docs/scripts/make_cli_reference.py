@@ -103,7 +103,15 @@ def parameter_tables(command: Any) -> list[str]:
             group = getattr(one, "rich_help_panel", None) or ("Options" if _is_option(one) else "Arguments")
             groups.setdefault(group, []).append(_row(one, hints))
     return [
-        "\n".join([f"**{group}**\n", f"| {'argument' if group == 'Arguments' else 'option'} | meaning | default |", "|---|---|---|", *rows]) + "\n"
+        "\n".join(
+            [
+                f"**{group}**\n",
+                f"| {'argument' if group == 'Arguments' else 'option'} | meaning | default |",
+                "|---|---|---|",
+                *rows,
+            ]
+        )
+        + "\n"
         for group, rows in sorted(groups.items(), key=lambda item: (item[0] != "Arguments", item[0] != "Options"))
     ]
 
