@@ -80,3 +80,10 @@ def test_examples_of_a_help_text_become_a_block(cli):
     listed = "Find it.\n\nExamples:\ngfimu noise run.csv\n# Of one channel\ngfimu noise run.csv --channel a11"
     assert block in cli.help_text(former)
     assert block in cli.help_text(listed)
+
+
+def test_a_numbered_equation_has_one_line(project_root):
+    """MathJax refuses a tag in an equation of several lines, and the site would show its complaint instead."""
+    for page in (project_root / "docs" / "theory").glob("*.md"):
+        for equation in re.findall(r"^ *\$\$\n(.*?)\$\$", page.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE):
+            assert not ("\\tag" in equation and "\\\\" in equation), f"{page.name}: {equation}"
