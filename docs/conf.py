@@ -37,7 +37,6 @@ myst_dmath_double_inline = True
 nb_execution_mode = "off"  # tests execute the notebooks
 
 # API: from docstrings in numpydoc form. Names in backticks link where they are documented.
-smartquotes = False  # an option keeps its two dashes
 highlight_language = "none"  # of blocks that name none: commands and their output
 default_role = "py:obj"
 autodoc_typehints = "none"

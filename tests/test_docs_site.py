@@ -4,9 +4,9 @@ import importlib.util
 import re
 
 import pytest
+import typer
 
 import gfimu
-from gfimu.cli.command_group import CommandGroup
 
 BUILT = {"_build", "api", "cli"}  # folders that Sphinx writes
 
@@ -64,20 +64,26 @@ def cli(project_root):
 
 def test_every_command_and_option_has_its_row(cli, tmp_path):
     pages = {path.stem: path.read_text(encoding="utf-8") for path in cli.write_pages(tmp_path)}
-    commands = CommandGroup(name="gfimu").commands
+    commands = typer.main.get_command(cli.program()).commands
     assert set(pages) == {*commands, "index"}
     for name, command in commands.items():
         assert f"({name}.md)" in pages["index"]
         for words, leaf in cli.leaves(name, command):
             assert f"\ngfimu {words} " in pages[name]
-            for option in (word for one in leaf.params for word in one.opts if word.startswith("--")):
+            for option in (
+                word
+                for one in leaf.params
+                if not getattr(one, "hidden", False)
+                for word in one.opts
+                if word[:2] == "--"
+            ):
                 assert f"`{option}`" in pages[name], f"{words} {option}"
 
 
 def test_examples_of_a_help_text_become_a_block(cli):
     block = "```sh\ngfimu noise run.csv\n# Of one channel\ngfimu noise run.csv --channel a11\n```"
     former = "Find it.\n\nExample: gfimu noise run.csv\n\nOf one channel: gfimu noise run.csv --channel a11"
-    listed = "Find it.\n\nExamples:\ngfimu noise run.csv\n# Of one channel\ngfimu noise run.csv --channel a11"
+    listed = "Find it.\n\nExamples\n--------\ngfimu noise run.csv\n# Of one channel\ngfimu noise run.csv --channel a11"
     assert block in cli.help_text(former)
     assert block in cli.help_text(listed)
 

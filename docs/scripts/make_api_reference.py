@@ -107,7 +107,8 @@ def _page(title: str, introduction: str, names: dict[str, Iterable[str]]) -> str
     for module, inside in names.items():
         for name in inside:
             thing = getattr(import_module(module), name)
-            rows.append(f"| {{py:obj}}`{name} <{module}.{name}>` | {_first_line(thing)} |")
+            target = thing.__name__ if isinstance(thing, types.ModuleType) else f"{module}.{name}"
+            rows.append(f"| {{py:obj}}`{name} <{target}>` | {_first_line(thing)} |")
             directives += [f".. currentmodule:: {module}", "", *_directive(thing, name, module), ""]
     return "\n".join(
         [

@@ -11,6 +11,7 @@ import inspect
 import re
 from collections.abc import Iterator, Mapping
 from enum import Enum
+from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, get_args, get_type_hints
@@ -57,6 +58,7 @@ def command_page(name: str, command: Any) -> str:
     for words, leaf in inside:
         parts += [f"## gfimu {words}\n"] if len(inside) > 1 else []
         parts += [f"```\n{usage(words, leaf)}\n```\n", help_text(leaf.help or ""), *parameter_tables(leaf)]
+        parts += python_line(words)
         parts += json_section(words) if any("--json" in one.opts for one in leaf.params) else []
     return "\n".join(parts)
 
@@ -76,10 +78,11 @@ def usage(words: str, command: Any) -> str:
 def help_text(text: str) -> str:
     """Return a help text as Markdown: its examples as blocks to copy.
 
-    An example is a paragraph ``what for: gfimu …``, or a line below ``Examples:``, with what it is for after a ``#``.
+    An example is a paragraph ``what for: gfimu …``, or a line of the section ``Examples`` below a ``#`` line that
+    says what for.
     """
-    described, _, listed = inspect.cleandoc(text).partition("\nExamples:\n")
-    lines = [line.strip() for line in listed.splitlines()]
+    described, *listed = re.split(r"\nExamples:?\n(?:-+\n)?", inspect.cleandoc(text), maxsplit=1)
+    lines = [line.strip() for line in "".join(listed).splitlines()]
     kept = []
     for paragraph in described.replace("\f", "").split("\n\n"):
         example = re.fullmatch(r"(.*?): (gfimu .*)", " ".join(paragraph.split()))
@@ -120,12 +123,36 @@ def json_section(words: str) -> list[str]:
     """Return what ``--json`` holds, where the program publishes a schema of it (`gfimu schema`)."""
     if find_spec("gfimu.commands.schema") is None:
         return []
-    return [f"**JSON**: `gfimu schema {words}` prints the schema of what `--json` writes.\n"]
+    published = import_module("gfimu.commands.schema")
+    if words not in published.schema_names():
+        return []
+    whole = published.schema(words)
+    parts = [f"**JSON**\n\n`gfimu schema {words}` prints the schema of what `--json` writes.\n"]
+    for option in whole.get("anyOf", [whole]):
+        result = whole["$defs"][option["$ref"].rpartition("/")[2]] if "$ref" in option else option
+        keys = result.get("properties", {})
+        if set(keys) - {"error"}:
+            rows = [f"| `{key}` | {escape(one.get('description', ''))} |" for key, one in keys.items()]
+            parts.append(
+                "\n".join([f"{escape(result.get('description', ''))}\n", "| key | meaning |", "|---|---|", *rows, ""])
+            )
+    return parts
+
+
+def python_line(words: str) -> list[str]:
+    """Return the sentence that names the function under a command."""
+    name = {"list": "catalogue"}.get(words, words)
+    for path in (f"gfimu.{name.replace(' ', '_')}", f"gfimu.commands.{name.replace(' ', '.')}"):
+        module, _, function = path.rpartition(".")
+        if find_spec(module) and callable(getattr(import_module(module), function, None)):
+            return [f"In Python: {{py:obj}}`{path.replace('gfimu.commands.', 'gfimu.')} <{path}>`.\n"]
+    return []
 
 
 def escape(text: str) -> str:
-    """Return a text whose bars and pointed brackets are no Markdown."""
-    return text.replace("|", "\\|").replace("<", "&lt;").replace("[", "\\[")
+    """Return a text whose bars and brackets are no Markdown, with options as code."""
+    text = text.replace("|", "\\|").replace("<", "&lt;").replace("[", "\\[")
+    return re.sub(r"(?<![`\w-])(--[a-z][\w-]*)", r"`\1`", text)
 
 
 def _hints(command: Any) -> dict[str, Any]:
