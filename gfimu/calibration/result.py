@@ -165,7 +165,7 @@ class Calibration:
 
     @property
     def chips(self) -> tuple[str, ...]:
-        """Names of the chips: the channel names without their axis number."""
+        """Names of the chips, the channel names without their axis number."""
         return tuple(channel[:-1] if self.unit != "rad_s" else "gyro" for channel in self.channels[::3])
 
     @cached_property

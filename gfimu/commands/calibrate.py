@@ -123,7 +123,7 @@ def calibrate(
         For ``spin``: standard deviations of each coordinate of a chip, m, and of the arm stretch, s²/rad²
         (`gfimu.calibration.spin.policy`).
     check : Recording, str or Path, optional
-        Other poses at rest, which the fit does not see: |a| − g on them goes into the statistics
+        Other poses at rest, which the fit does not see: ``|a| − g`` on them goes into the statistics
         (`gfimu.calibration.check_poses`).
     rate_table : bool
         For ``gyro``: the recording is of a rate table, whose rate (``tacho_rad_s``) is the reference

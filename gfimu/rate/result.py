@@ -176,7 +176,7 @@ class RateEstimate(Tabular):
 
     @property
     def mean_nis(self) -> float:
-        """Sum of ``nis`` over the sum of its degrees of freedom: 1 for a filter whose model is right."""
+        """Sum of ``nis`` over the sum of its degrees of freedom, 1 for a filter whose model is right."""
         used = (self.nis_dof > 0) & np.isfinite(self.nis)
         freedom = int(self.nis_dof[used].sum())
         return float(self.nis[used].sum() / freedom) if freedom else float("nan")

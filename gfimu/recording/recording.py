@@ -85,7 +85,7 @@ class Recording(Tabular):
 
     @property
     def sample_period(self) -> float:
-        """Nominal sample period: the median step of the times, s."""
+        """Nominal sample period, the median step of the times, s."""
         if len(self.t_s) < 2:
             raise InputError("a recording of fewer than two samples has no sample rate; record longer")
         return float(np.median(np.diff(self.t_s)))

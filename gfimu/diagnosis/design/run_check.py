@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
 
 from gfimu.diagnosis.data.run import Run, prepare_run
 from gfimu.diagnosis.design.distinguishability import (
@@ -25,7 +27,7 @@ from gfimu.recording import Recording
 from gfimu.recording.checks import check_recording
 from gfimu.world_model import WorldModel, is_linear, reads_place
 
-__all__ = ["EffectView", "RunCheck", "UsefulRun", "check_runs"]
+__all__ = ["EffectView", "RunCheck", "UsefulRun", "check_runs", "turns_one_way"]
 
 
 @dataclass(frozen=True)
@@ -162,7 +164,7 @@ def _facts(run: Run, name: str, model: WorldModel, useful: UsefulRun) -> dict[st
     place = drive if is_linear(model) else np.unwrap(drive)
     rate = np.gradient(place, t) if reads_place(model) else drive
     unit, slow = ("m", useful.speed) if is_linear(model) else ("rad", useful.rate)
-    turns = {} if is_linear(model) else {"turns": float(np.abs(np.trapezoid(rate, t)) / (2.0 * np.pi))}
+    turns = {} if is_linear(model) else {"turns": turns_one_way(rate, t)}
     return {
         "name": name,
         "duration_s": run.duration,
@@ -174,6 +176,11 @@ def _facts(run: Run, name: str, model: WorldModel, useful: UsefulRun) -> dict[st
         "share_backwards": float(np.mean(rate < -slow)),
         "share_at_rest": float(np.mean(np.abs(rate) < 0.1 * slow)),
     }
+
+
+def turns_one_way(rate: NDArray[np.float64], t: NDArray[np.float64]) -> float:
+    """Return the most turns between two places of the table: turning back takes none away."""
+    return float(np.ptp(cumulative_trapezoid(rate, t, initial=0.0)) / (2.0 * np.pi))
 
 
 def _temperature(recording: Recording) -> dict[str, float]:
