@@ -20,15 +20,15 @@ OPTIONAL: dict[str, tuple[str, str]] = {
     "matplotlib": ("matplotlib", "plot"),
     "unicorn": ("unicorn", "firmware"),
     "ziglang": ("ziglang", "firmware"),
-    "distributed": ("distributed", "cluster"),
-    "dask_jobqueue": ("dask-jobqueue", "cluster"),
-    "pandas": ("pandas", "tables"),
-    "polars": ("polars", "tables"),
     "h5py": ("h5py", "formats"),
     "mcap": ("mcap", "formats"),
     "pyulog": ("pyulog", "formats"),
     "rosbags": ("rosbags", "formats"),
     "openpyxl": ("openpyxl", "formats"),
+    "pandas": ("pandas", "tables"),
+    "polars": ("polars", "tables"),
+    "distributed": ("distributed", "cluster"),
+    "dask_jobqueue": ("dask-jobqueue", "cluster"),
 }
 """Names to import: the package that holds each on PyPI, and the extra of gfimu that installs it."""
 
