@@ -209,7 +209,7 @@ def _found(
         speeds = ", ".join(str(speed) for speed in sorted(SPEEDS))
         raise InputError(
             f"{port or 'serial ports'}: no board answers or sends {form or 'a known format'} at {speeds} baud; "
-            "check power, cable and --format (docs/bench.md)"
+            "check power, cable and --format (docs/how_to/bench.md)"
         )
     for board in boards:
         if on_find is not None:
