@@ -106,7 +106,7 @@ if TYPE_CHECKING:
     from gfimu.sensor_noise import identify_noise as identify_noise
     from gfimu.sensor_noise import recording_noise as recording_noise
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _PUBLIC = {
     "AccelerometerArray": "gfimu.geometry.array",

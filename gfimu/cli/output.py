@@ -87,16 +87,18 @@ def progress(description: str, total: float | None = None, *, time_left: bool = 
 
     Without ``time_left`` the bar shows none: where some of the work was done before, its rate is not that of this call.
     """
+    screen = console(stderr=True)
+    if not screen.is_terminal:  # rich before 14.3 prints an empty line there even when it is disabled
+        yield lambda done, text=None: None
+        return
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-    screen = console(stderr=True)
     with Progress(
         TextColumn("{task.description}", markup=False),
         BarColumn(),
         *([TimeRemainingColumn()] if time_left else []),
         console=screen,
         transient=True,
-        disable=not screen.is_terminal,
     ) as bar:
         task = bar.add_task(description, total=total)
         yield lambda done, text=None: bar.update(task, completed=done, description=text or description)

@@ -90,6 +90,9 @@ class CampaignTable:
         }
 
 
+_PICTURE = OutputFile("a picture", (".png", ".svg", ".html"), dict.fromkeys((".png", ".svg", ".html"), ("matplotlib",)))
+
+
 @writes(reads=("folder",))
 def campaign_status(folder: str | Path) -> CampaignStatus:
     """Say how far a campaign is, also while another process runs it.
@@ -143,7 +146,7 @@ def campaign_table(folder: str | Path, *, by: Sequence[str] = (), csv: str | Pat
     return found
 
 
-@writes(reads=("folder",), out=OutputFile("a picture", (".png", ".svg", ".html")))
+@writes(reads=("folder",), out=_PICTURE)
 def campaign_plot(folder: str | Path, *, out: str | Path, result: Sequence[str] = ()) -> list[str]:
     """Draw results against each factor, and which factors cause their variance; return the names of what is drawn.
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gfimu.errors import InputError
 from gfimu.files.outputs import OutputFolder, same_file, writes
+from gfimu.optional_packages import missing
 
 if TYPE_CHECKING:
     from gfimu.calibration.result import Calibration
@@ -17,7 +18,10 @@ if TYPE_CHECKING:
     from gfimu.joining import Joined
     from gfimu.recording import Recording
     from gfimu.recording.mapped import MappedFile
+    from gfimu.visual.scene import Shape
     from gfimu.world_model import WorldModel
+    from sim.twin import Twin
+    from sim.world import World
 
 __all__ = ["FOLDER", "diagnose", "write_result"]
 
@@ -56,7 +60,8 @@ def diagnose(
         What the simulation believes: a twin, its name or file; or a simulation of one's own, as such or as
         ``rig.py:function`` (`gfimu.own_rig.load_model`).
     out : str or Path, optional
-        Folder for ``verdict.json``, ``twin.toml``, ``report.html`` and ``diagnosis.rrd``; made if it isn't there.
+        Folder for ``verdict.json``, ``twin.toml``, ``report.html`` and ``diagnosis.rrd``; made if it isn't there. A
+        file whose package is not installed is left out, with a warning before the work begins.
     held_out : Recording, path, or sequence of these
         Recordings kept for measuring the gain.
     calibration : Calibration, str or Path, optional
@@ -96,6 +101,10 @@ def diagnose(
     from gfimu.joining import displaced_reference
     from gfimu.recording.checks import examine
 
+    if out is not None:
+        from gfimu.diagnosis.report.folder import warn_of_omitted
+
+        warn_of_omitted()
     runs, unseen = ([by_map(run, column_map, map_set) for run in as_runs(group)] for group in (recordings, held_out))
     _refuse_fitted(runs, unseen)
     model = as_twin(twin)
@@ -160,13 +169,15 @@ def _explained(
 
 
 def write_result(out: str | Path, found: Diagnosis, recording: Recording) -> dict[str, Path]:
-    """Write the folder of a diagnosis; the rig of an extended `sim.twin.Twin` is drawn by its MuJoCo model."""
+    """Write the folder of a diagnosis.
+
+    The rig of an extended `sim.twin.Twin` is drawn by its MuJoCo model where mujoco and rerun-sdk are installed.
+    """
     import tomli_w
 
     from gfimu.diagnosis.report.folder import write_diagnosis
     from gfimu.diagnosis.report.rig import DrawnRig
     from gfimu.files.model_files import list_models
-    from sim.drawing import rig_drawing
     from sim.twin import Twin
 
     twin = found.twin
@@ -187,10 +198,19 @@ def write_result(out: str | Path, found: Diagnosis, recording: Recording) -> dic
         rig=DrawnRig(
             world.mount_rotvec,
             world.cube_offset,
-            None if twin.drive_source == "gyro" or world.slide is not None else rig_drawing(world),
+            _shapes(twin, world),
             world.slide,
         ),
     )
+
+
+def _shapes(twin: Twin, world: World) -> Mapping[str, Sequence[Shape]] | None:
+    """Return the shapes of the rig; None where it has none of its own, or is not drawn here."""
+    if twin.drive_source == "gyro" or world.slide is not None or missing("mujoco", "rerun"):
+        return None
+    from sim.drawing import rig_drawing
+
+    return rig_drawing(world)
 
 
 def _refuse_fitted(fitted: Sequence[object], held_out: Sequence[object]) -> None:

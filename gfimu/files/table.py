@@ -14,7 +14,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from gfimu.errors import GfimuError
+from gfimu.optional_packages import require
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -63,10 +63,9 @@ class Tabular(ABC):
         GfimuError
             If pandas is not installed.
         """
-        try:
-            import pandas as pd
-        except ImportError:
-            raise GfimuError("to_pandas needs pandas, which is not installed: pip install 'gfimu[tables]'") from None
+        require("to_pandas", "pandas")
+        import pandas as pd
+
         table = pd.DataFrame(dict(self.to_columns()))
         table.attrs = json.loads(to_json(dict(self._table_metadata())))
         return table
