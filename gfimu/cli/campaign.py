@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from typer.core import TyperGroup
 
 from gfimu.cli.campaign_views import (
     ByOption,
@@ -18,13 +17,15 @@ from gfimu.cli.campaign_views import (
     status,
     table,
 )
-from gfimu.cli.output import JsonOption, print_json, print_paths, progress
+from gfimu.cli.command import CommandApp, GfimuGroup
+from gfimu.cli.output import print_json, print_paths, progress
+from gfimu.cli.shared_options import JsonOption, shared
 from gfimu.errors import InputError
 
 __all__ = ["register"]
 
 
-class _Campaigns(TyperGroup):
+class _Campaigns(GfimuGroup):
     """The commands; without the name of one, what follows is the plan that `run` takes."""
 
     default = "run"
@@ -40,7 +41,7 @@ class _Campaigns(TyperGroup):
 
 def register(app: typer.Typer) -> None:
     """Add the commands."""
-    group = typer.Typer(
+    group = CommandApp(
         cls=_Campaigns,
         help="Run many simulated cases by a plan into one dataset, and summarise it; a second call goes on where one "
         "ended.\n\nExample: gfimu campaign plan.toml --out campaign\n\nThe word run may be left out.",
@@ -55,14 +56,14 @@ def register(app: typer.Typer) -> None:
 
 
 def _run(
-    plan: Annotated[Path, typer.Argument(help="Plan (.toml), or the folder of a campaign, of which nothing is run.")],
+    plan: Annotated[
+        Path, typer.Argument(metavar="PLAN", help="Plan (.toml), or the folder of a campaign, of which nothing is run.")
+    ],
     out: Annotated[
         Path | None, typer.Option("--out", help="Folder to write; one that was begun is gone on with.")
     ] = None,
     by: ByOption = None,
-    workers: Annotated[
-        int | None, typer.Option("--workers", help="Processes, or jobs of slurm; by default one per processor.")
-    ] = None,
+    workers: Annotated[int | None, shared("--workers", more="; with --cluster slurm, jobs")] = None,
     cluster: Annotated[
         str, typer.Option("--cluster", help="Dask scheduler instead, such as tcp://host:8786, or slurm.")
     ] = "",
@@ -70,9 +71,15 @@ def _run(
 ) -> None:
     """Run the cases of a plan that the folder lacks, and summarise them; or summarise a folder.
 
-    Example: gfimu new plan --out plan.toml, then gfimu campaign plan.toml --out campaign
+    Exit code 1 if every case failed. After Ctrl-C the finished cases stay; the same command goes on with the others.
 
-    Example: gfimu campaign campaign --by method
+    Examples
+    --------
+    # A plan to edit, then its cases
+    gfimu new plan --out plan.toml
+    gfimu campaign plan.toml --out campaign
+    # Summarise a folder by a factor
+    gfimu campaign campaign --by method
     """
     from gfimu.commands.campaign import campaign
 

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, print_text
+from gfimu.cli.output import print_json, print_paths, print_table, print_text
+from gfimu.cli.shared_options import JsonOption, shared
 
 if TYPE_CHECKING:
     from gfimu.commands.campaign_views import CampaignTable
@@ -18,17 +19,20 @@ if TYPE_CHECKING:
 
 __all__ = ["ByOption", "duration_text", "plot", "print_failures", "print_groups", "status", "table"]
 
-FolderArgument = Annotated[Path, typer.Argument(help="Folder of the campaign.")]
-ByOption = Annotated[
-    list[str] | None,
-    typer.Option("--by", metavar="FACTOR", help="Factor to group by; may be repeated. A range is cut into fifths."),
-]
+FolderArgument = Annotated[Path, typer.Argument(metavar="DIR", help="Folder of the campaign.")]
+ByOption = Annotated[list[str] | None, shared("--by")]
 
 
 def status(folder: FolderArgument, json: JsonOption = False) -> None:
     """Say how far a campaign is, also while another process runs it: cases, rate, time left, failures.
 
-    Example: gfimu campaign status campaign
+    Writes nothing.
+
+    Examples
+    --------
+    gfimu campaign status campaign
+    # For a monitor
+    gfimu campaign status campaign --json
     """
     from gfimu.commands.campaign_views import campaign_status
 
@@ -57,7 +61,11 @@ def table(
 ) -> None:
     """Print quantiles of each result by the values of factors, and which factors cause its variance.
 
-    Example: gfimu campaign table campaign --by method --csv quantiles.csv
+    Examples
+    --------
+    gfimu campaign table campaign --by method
+    # The quantiles as a file
+    gfimu campaign table campaign --by method --csv quantiles.csv
     """
     from gfimu.commands.campaign_views import campaign_table
 
@@ -73,7 +81,7 @@ def table(
 
 def plot(
     folder: FolderArgument,
-    out: Annotated[Path, typer.Option("--out", help="Picture to write: .png, .svg or .html.")],
+    out: Annotated[Path, typer.Option("--out", help="Picture to write (.png, .svg, .html).")],
     result: Annotated[
         list[str] | None,
         typer.Option("--result", metavar="NAME", help="Result to draw; may be repeated. The first four by default."),
@@ -81,7 +89,11 @@ def plot(
 ) -> None:
     """Draw results against each factor, and which factors cause their variance.
 
-    Example: gfimu campaign plot campaign --out campaign.png
+    Examples
+    --------
+    gfimu campaign plot campaign --out campaign.png
+    # One result, to zoom into
+    gfimu campaign plot campaign --result rate_rmse_rad_s --out campaign.html
     """
     from gfimu.commands.campaign_views import campaign_plot
 

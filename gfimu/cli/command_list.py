@@ -43,7 +43,7 @@ JOBS: dict[str, tuple[Entry, ...]] = {
         ),
         Entry(
             "convert",
-            "Convert a recording between CSV and Parquet, or import a MIMU4444 stream or a foreign file. Readings "
+            "Convert a recording between CSV and Parquet, or import MIMU4444 streams and foreign files. Readings "
             "become m/s².",
             "convert",
         ),

@@ -8,7 +8,8 @@ from typing import Annotated
 
 import typer
 
-from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, print_text
+from gfimu.cli.output import print_json, print_paths, print_table, print_text
+from gfimu.cli.shared_options import JsonOption, shared
 
 __all__ = ["register"]
 
@@ -19,15 +20,22 @@ def register(app: typer.Typer) -> None:
 
 
 def _demo(
-    out: Annotated[Path, typer.Option("--out", help="Folder to write to; made if it isn't there.")] = Path(
+    out: Annotated[Path, typer.Option("--out", help="Folder to write; made where it is not there.")] = Path(
         "gfimu-demo"
     ),
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of everything left to chance.")] = 1,
+    seed: Annotated[int, shared("--seed", min=0)] = 1,
     json: JsonOption = False,
 ) -> None:
     """Run the paper's experiment in simulation: geometry, recording, estimate, drift, picture, diagnosis.
 
-    Example: gfimu demo --out demo
+    Writes a folder with the recording, the estimate, pictures, a rerun recording and the diagnosis with its report. It
+    takes about a minute.
+
+    Examples
+    --------
+    gfimu demo
+    # Another draw of the noise, in a folder of your own
+    gfimu demo --out demo --seed 2
     """
     from gfimu.commands.demo import demo
 

@@ -9,8 +9,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gfimu.cli.mapped import ForceOption, MapOption, MapSetOption, ReferenceMapSetOption
-from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, print_text, progress
+from gfimu.cli.output import print_json, print_paths, print_table, print_text, progress
+from gfimu.cli.shared_options import (
+    ForceOption,
+    JsonOption,
+    MapOption,
+    MapSetOption,
+    ReferenceMapSetOption,
+    TwinOption,
+    shared,
+)
 from gfimu.errors import InputError
 
 if TYPE_CHECKING:
@@ -29,9 +37,9 @@ def _diagnose(
         list[Path],
         typer.Argument(metavar="RUN...", help="Recordings of one rig: .csv, .parquet, .bin; fitted together."),
     ],
-    twin: Annotated[str, typer.Option("--twin", help="What the simulation believes: a name, or a twin file (.toml).")],
+    twin: TwinOption,
     out: Annotated[
-        Path | None, typer.Option("--out", help="Folder for verdict.json, twin.toml, report.html, diagnosis.rrd.")
+        Path | None, typer.Option("--out", help="Folder to write: verdict.json, twin.toml, report.html, diagnosis.rrd.")
     ] = None,
     check: Annotated[
         bool, typer.Option("--check", help="Only look at the recordings, as `gfimu check`: no diagnosis, no --out.")
@@ -40,10 +48,7 @@ def _diagnose(
         list[Path] | None,
         typer.Option("--held-out", metavar="RUN", help="Recording kept for measuring the gain; may be repeated."),
     ] = None,
-    calibration: Annotated[
-        Path | None,
-        typer.Option("--calibration", help="Calibration of the unit, applied first (JSON, from `gfimu calibrate`)."),
-    ] = None,
+    calibration: Annotated[Path | None, shared("--calibration")] = None,
     grammar: Annotated[
         bool,
         typer.Option(
@@ -59,25 +64,26 @@ def _diagnose(
             "--reference", help="Reference of the first run on a clock of its own; aligned as by `gfimu join`."
         ),
     ] = None,
-    reference_map: Annotated[
-        str | None, typer.Option("--reference-map", metavar="MAP", help="Column map of that file.")
-    ] = None,
+    reference_map: Annotated[str | None, shared("--reference-map")] = None,
     reference_map_set: ReferenceMapSetOption = None,
     json: JsonOption = False,
 ) -> None:
     """Show what a simulation gets wrong against recordings, name the cause, extend the simulation, measure the gain.
 
-    Writes the verdict, the extended twin, a report for people and a rerun recording to a folder.
+    Writes the verdict, the extended twin, a report for people and a rerun recording to a folder. The exit code is 0
+    whatever the verdict.
 
-    Example: gfimu diagnose run.parquet --twin cube12_turntable --out diagnosis
-
-    What the recording can show, first: gfimu diagnose run.parquet --twin cube12_turntable --check
-
-    A rig known to be unusual: gfimu diagnose run.parquet --twin cube12_turntable --grammar --out diagnosis
-
-    Two loggers of two clocks: gfimu diagnose accel.csv --map mine.toml --reference tacho.csv --twin rig.toml --out d
-
-    A unit fresh from the bench: gfimu diagnose run.parquet --twin cube12_turntable --calibration cal.json --out d
+    Examples
+    --------
+    gfimu diagnose run.parquet --twin cube12_turntable --out diagnosis
+    # What the recording can show, first
+    gfimu diagnose run.parquet --twin cube12_turntable --check
+    # A rig known to be unusual
+    gfimu diagnose run.parquet --twin cube12_turntable --grammar --out diagnosis
+    # Two loggers with two clocks
+    gfimu diagnose accel.csv --map mine.toml --reference tacho.csv --twin rig.toml --out diagnosis
+    # A unit fresh from the bench
+    gfimu diagnose run.parquet --twin cube12_turntable --calibration cal.json --out diagnosis
     """
     if check:
         from gfimu.cli.check import print_check

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from gfimu.cli import completion
 from gfimu.cli.output import print_paths
 from gfimu.commands.catalogue import SENDER, TEMPLATES
 
@@ -19,9 +20,19 @@ def register(app: typer.Typer) -> None:
 
 
 def _new(
-    kind: Annotated[str, typer.Argument(help=f"What to begin: {', '.join((*TEMPLATES, SENDER))}.")],
+    kind: Annotated[
+        str,
+        typer.Argument(
+            metavar="KIND",
+            autocompletion=completion.words(*TEMPLATES, SENDER),
+            help=f"What to begin: {', '.join((*TEMPLATES, SENDER))}.",
+        ),
+    ],
     folder: Annotated[
-        Path | None, typer.Argument(help="Of a sender: folder to write; without it, what to do with it is printed.")
+        Path | None,
+        typer.Argument(
+            metavar="[FOLDER]", help="Of a sender: folder to write; without it, what to do with it is printed."
+        ),
     ] = None,
     out: Annotated[Path | None, typer.Option("--out", help="File to write (.toml); printed without it.")] = None,
     schema: Annotated[
@@ -30,11 +41,14 @@ def _new(
 ) -> None:
     """Write a commented file to edit.
 
-    A sender is a folder of C files: with them a microcontroller of yours sends what gfimu record reads.
+    A sender is a folder of C files: with them a microcontroller of yours sends what gfimu record reads. Without --out
+    the file is printed. A file that is there is not replaced.
 
-    Example: gfimu new array --out my_array.toml --schema array.schema.json
-
-    Example: gfimu new sender my_sender
+    Examples
+    --------
+    gfimu new array --out my_array.toml --schema array.schema.json
+    # C files for a board of your own
+    gfimu new sender my_sender
     """
     from gfimu.commands.catalogue import new
 

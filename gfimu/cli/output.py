@@ -11,16 +11,14 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-__all__ = ["JsonOption", "console", "plain", "print_json", "print_paths", "print_table", "print_text", "progress"]
-
-JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object for machines instead of tables.")]
+__all__ = ["console", "plain", "print_json", "print_paths", "print_table", "print_text", "progress"]
 
 
 def console(*, stderr: bool = False) -> Console:

@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 
 from gfimu.cli.axis_options import AxisOption, AxisPointOption, HubOption, InclinationOption
-from gfimu.cli.mapped import ForceOption, MapOption, MapSetOption
 from gfimu.cli.output import print_paths
+from gfimu.cli.shared_options import ForceOption, MapOption, MapSetOption, shared
 
 __all__ = ["register"]
 
@@ -21,28 +21,34 @@ def register(app: typer.Typer) -> None:
 
 def _view(
     file: Annotated[
-        Path, typer.Argument(help="A .rrd file, or a recording or estimate (.csv, .parquet, .bin) to make one from.")
+        Path,
+        typer.Argument(
+            metavar="FILE", help="A .rrd file, or a recording or estimate (.csv, .parquet, .bin) to make one from."
+        ),
     ],
-    array: Annotated[
-        str | None,
-        typer.Option("--array", help="Array: a name, a .toml file or MJCF sites (.xml); else the recording's own."),
-    ] = None,
+    array: Annotated[str | None, shared("--array", more="; else the recording's own")] = None,
     column_map: MapOption = None,
     map_set: MapSetOption = None,
     axis: AxisOption = None,
     axis_point: AxisPointOption = (0.0, 0.0, 0.0),
     hub: HubOption = "fixed",
     inclination_rad: InclinationOption = None,
-    out: Annotated[Path | None, typer.Option("--out", help="Write the .rrd here and don't open it.")] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Rerun recording to write (.rrd); the viewer is not opened.")
+    ] = None,
     force: ForceOption = False,
 ) -> None:
     """Open a run in the rerun viewer: the rig in 3-D, raw channels, and the estimate over time.
 
     A recording of readings is estimated first; its picture goes beside it as FILE.view.rrd.
 
-    Example: gfimu view run.parquet
-
-    One chip on a table: gfimu view run.csv --array arm.toml --axis z
+    Examples
+    --------
+    gfimu view run.parquet
+    # Write the picture without opening it
+    gfimu view run.parquet --out run.rrd
+    # One chip on a table
+    gfimu view run.csv --array arm.toml --axis z
     """
     from gfimu.commands.view import view
 
