@@ -71,7 +71,7 @@ def table(
 
     found = campaign_table(folder, by=by or [], csv=csv)
     if json:
-        print_json(found.to_dict())
+        print_json(found.to_dict() | {"files": {} if csv is None else {"quantiles": csv}})
         return
     print_groups(str(folder), found.groups)
     _print_sensitivities(found)
@@ -86,6 +86,7 @@ def plot(
         list[str] | None,
         typer.Option("--result", metavar="NAME", help="Result to draw; may be repeated. The first four by default."),
     ] = None,
+    json: JsonOption = False,
 ) -> None:
     """Draw results against each factor, and which factors cause their variance.
 
@@ -97,8 +98,11 @@ def plot(
     """
     from gfimu.commands.campaign_views import campaign_plot
 
-    campaign_plot(folder, out=out, result=result or [])
-    print_paths([("picture", out)])
+    drawn = campaign_plot(folder, out=out, result=result or [])
+    if json:
+        print_json({"results": drawn, "files": {"picture": out}})
+    else:
+        print_paths([("picture", out)])
 
 
 def print_groups(title: str, groups: Sequence[Group]) -> None:

@@ -71,6 +71,16 @@ class GfimuGroup(TyperGroup):
             ctx.fail(f"No such command {name!r}" + (f"; did you mean {near!r}?" if near else "."))
         return super().resolve_command(ctx, args)
 
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write the commands with the first line of each one's help."""
+        rows = [
+            (name, (command.help or "").partition("\n")[0])
+            for name in self.list_commands(ctx)
+            if (command := self.get_command(ctx, name)) is not None
+        ]
+        with formatter.section("Commands"):
+            formatter.write_dl(rows)
+
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Write the help."""
         write_help(self, ctx, formatter)

@@ -1,4 +1,4 @@
-"""The names of the effects of the library, for a shell that must not wait until their code is loaded; a test compares."""
+"""The names of the effects, for a shell that must not wait until their code is loaded; a test compares."""
 
 from __future__ import annotations
 

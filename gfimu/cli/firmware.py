@@ -28,7 +28,11 @@ PythonOption = Annotated[
 
 def register(app: typer.Typer) -> None:
     """Add the commands."""
-    group = CommandApp(help="The LPC1768 image in the emulator: run, build, selftest, trace, faults, check.")
+    group = CommandApp(
+        help="The LPC1768 image in the emulator: run, build, selftest, trace, faults, check.\n\nExamples\n--------\n"
+        "gfimu firmware selftest\n# What each command does\ngfimu firmware run --help",
+        no_args_is_help=True,
+    )
     group.command(name="run")(_run)
     group.command(name="build")(_build)
     group.command(name="selftest")(_selftest)
@@ -94,7 +98,7 @@ def _run_to_file(
                 "stream": asdict(made.stream),
                 "identity": None if made.identity is None else asdict(made.identity),
                 "warnings": made.warnings,
-                "files": [out],
+                "files": {"recording": out},
             }
         )
         return
@@ -249,7 +253,7 @@ def _trace(
 
     found = trace(out, scenario=scenario, duration=duration, skip=skip, rate=rate, seed=seed, image=image)
     if json:
-        print_json({"events": found.events, "exceptions": found.exceptions, "files": [out]})
+        print_json({"events": found.events, "exceptions": found.exceptions, "files": {"trace": out}})
         return
     rows = [("register accesses", found.accesses), ("exceptions", found.exceptions)]
     print_table(f"{duration:g} s of {image}", ("quantity", "value"), rows)

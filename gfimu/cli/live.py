@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from gfimu.cli.axis_options import AxisOption, AxisPointOption, HubOption, InclinationOption
-from gfimu.cli.shared_options import ForceOption, shared
+from gfimu.cli.shared_options import ForceOption, JsonOption, shared
 
 __all__ = ["register"]
 
@@ -42,6 +42,7 @@ def _live(
     inclination_rad: InclinationOption = None,
     keep_faulty: Annotated[bool, shared("--keep-faulty")] = False,
     force: ForceOption = False,
+    json: JsonOption = False,
 ) -> None:
     """Estimate the angular rate while samples arrive: CSV lines in, one JSON line per sample out.
 
@@ -58,6 +59,8 @@ def _live(
     gfimu live --from socket://pi:4000 --array wheel.toml --axis z --hub free --unknown-start
     """
     from gfimu.commands.live import live
+
+    del json  # every line is JSON in any case; with it an error is one too
 
     for line in live(
         array,

@@ -8,7 +8,8 @@ from typing import Annotated
 import typer
 
 from gfimu.cli import completion
-from gfimu.cli.output import print_paths
+from gfimu.cli.output import print_json, print_paths
+from gfimu.cli.shared_options import JsonOption
 from gfimu.commands.catalogue import SENDER, TEMPLATES
 
 __all__ = ["register"]
@@ -38,6 +39,7 @@ def _new(
     schema: Annotated[
         Path | None, typer.Option("--schema", help="JSON schema to write (.json), for completion in an editor.")
     ] = None,
+    json: JsonOption = False,
 ) -> None:
     """Write a commented file to edit.
 
@@ -53,8 +55,11 @@ def _new(
     from gfimu.commands.catalogue import new
 
     text = new(kind, folder, out=out, schema=schema)
-    if folder is None and out is None and schema is None:
-        typer.echo(text, nl=False)
+    named = {kind: folder or out, "schema": schema}
+    files = {what: path for what, path in named.items() if path is not None}
+    if json:
+        print_json({"kind": kind, "text": text, "files": files})
+    elif files:
+        print_paths(files.items())
     else:
-        written = {kind: folder or out, "schema": schema}
-        print_paths([(what, path) for what, path in written.items() if path is not None])
+        typer.echo(text, nl=False)

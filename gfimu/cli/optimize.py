@@ -105,15 +105,16 @@ def _optimize(
             front=front,
             report=advance,
         )
+    named = {"array": out, "picture": picture, "front": front}
+    files = {what: path for what, path in named.items() if path is not None}
     if json:
-        print_json(result.to_dict())
+        print_json(result.to_dict() | {"files": files})
         return
     if isinstance(result, Front):
         _print_front(result)
     else:
         _print_result(result)
-    written = [("the array", out), ("the picture", picture), ("the front", front)]
-    print_paths([(what, path) for what, path in written if path is not None])
+    print_paths(files.items())
 
 
 def _print_result(result: SearchResult) -> None:

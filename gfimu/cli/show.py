@@ -7,6 +7,8 @@ from typing import Annotated
 import typer
 
 from gfimu.cli import completion
+from gfimu.cli.output import print_json
+from gfimu.cli.shared_options import JsonOption
 
 __all__ = ["register"]
 
@@ -25,6 +27,7 @@ def _show(
             help="Name of an array, part, map, twin, scenario or effect; a file; or a recording.",
         ),
     ],
+    json: JsonOption = False,
 ) -> None:
     """Print a file that comes with gfimu, a checked file of one's own, or the array of a recording.
 
@@ -40,4 +43,8 @@ def _show(
     """
     from gfimu.commands.catalogue import show
 
-    typer.echo(show(name), nl=False)
+    text = show(name)
+    if json:
+        print_json({"name": name, "text": text})
+    else:
+        typer.echo(text, nl=False)

@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 
 from gfimu.cli.axis_options import AxisOption, AxisPointOption, HubOption, InclinationOption
-from gfimu.cli.output import print_paths
-from gfimu.cli.shared_options import ForceOption, MapOption, MapSetOption, shared
+from gfimu.cli.output import print_json, print_paths
+from gfimu.cli.shared_options import ForceOption, JsonOption, MapOption, MapSetOption, shared
 
 __all__ = ["register"]
 
@@ -37,6 +37,7 @@ def _view(
         Path | None, typer.Option("--out", help="Rerun recording to write (.rrd); the viewer is not opened.")
     ] = None,
     force: ForceOption = False,
+    json: JsonOption = False,
 ) -> None:
     """Open a run in the rerun viewer: the rig in 3-D, raw channels, and the estimate over time.
 
@@ -52,7 +53,16 @@ def _view(
     """
     from gfimu.commands.view import view
 
-    view(
+    shown: list[Path] = []
+
+    def show(picture: Path) -> None:
+        shown.append(picture)
+        if json:
+            print_json({"files": {"rerun recording": picture}})
+        else:
+            print_paths([("rerun recording", picture)])
+
+    picture = view(
         file,
         array=array,
         column_map=column_map,
@@ -63,5 +73,7 @@ def _view(
         inclination_rad=inclination_rad,
         out=out,
         force=force,
-        on_picture=lambda picture: print_paths([("rerun recording", picture)]),
+        on_picture=show,
     )
+    if json and not shown:  # the file is a picture itself
+        show(picture)
