@@ -33,6 +33,11 @@ JOBS: dict[str, tuple[Entry, ...]] = {
             "show",
         ),
         Entry("new", "Write a commented file to edit.", "new"),
+        Entry(
+            "schema",
+            "Print the JSON schema of what a command prints with --json: every key with its meaning and unit.",
+            "schema",
+        ),
     ),
     "Bring a recording": (
         Entry(

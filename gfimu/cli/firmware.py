@@ -129,9 +129,9 @@ def _run_behind_port(
 
     def opened(name: str) -> None:
         names.append(name)
-        if not json:
-            print_text(f"board on {name}; Ctrl-C ends it")
-            print_text(f"  gfimu record --port {name} --out run.parquet")
+        # With --json standard output is for the one object at the end; where the board is has to be known before.
+        print_text(f"board on {name}; Ctrl-C ends it", stderr=json)
+        print_text(f"  gfimu record --port {name} --out run.parquet", stderr=json)
 
     report = run(
         scenario=scenario, port=port, duration=duration, rate=rate, range_g=range_g, realtime=realtime, seed=seed,
@@ -193,7 +193,7 @@ def _build(
         defines[name] = value
     report = build(image, out=out, array=array, baud=baud, define=defines)
     if json:
-        print_json(asdict(report))
+        print_json(asdict(report) | {"files": {"ELF file": report.elf, "image": report.binary}})
         return
     print_table(
         f"image {image}",
