@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib.util
 import multiprocessing
+import signal
 import sys
 import threading
 from array import array
@@ -90,7 +91,7 @@ class BoardProcess:
         self._process = context.Process(
             target=_work, args=(theirs, path, tuple(chips), self.fast, trace, lose_every, array), daemon=True
         )
-        with _without_main():
+        with _without_main(), _without_interrupt():
             self._process.start()
         theirs.close()
         self._call("ready")
@@ -208,6 +209,22 @@ def _without_main() -> Iterator[None]:
         yield
     finally:
         sys.modules["__main__"] = main
+
+
+@contextmanager
+def _without_interrupt() -> Iterator[None]:
+    """Let a new process leave Ctrl-C, which a terminal sends to every process, to the one that starts it.
+
+    A process begins with the blocked signals of the thread that starts it.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _work(

@@ -6,6 +6,7 @@ import contextlib
 import importlib
 import json
 import os
+import signal
 import sys
 import tempfile
 import traceback
@@ -92,7 +93,7 @@ def main() -> None:
         except KeyboardInterrupt:
             code = report.stopped(stop)
         except BaseException as error:  # noqa: BLE001  some libraries' own exceptions are no Exception
-            code = report.failed(error)
+            code = report.stopped(stop) if stop.received == signal.SIGTERM else report.failed(error)
     raise SystemExit(code or 0)
 
 

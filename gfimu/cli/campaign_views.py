@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gfimu.cli.output import print_json, print_paths, print_table, print_text
+from gfimu.cli.output import print_json, print_paths, print_table, print_text, progress
 from gfimu.cli.shared_options import JsonOption, shared
 
 if TYPE_CHECKING:
@@ -69,7 +69,8 @@ def table(
     """
     from gfimu.commands.campaign_views import campaign_table
 
-    found = campaign_table(folder, by=by or [], csv=csv)
+    with progress("reading the campaign"):
+        found = campaign_table(folder, by=by or [], csv=csv)
     if json:
         print_json(found.to_dict() | {"files": {} if csv is None else {"quantiles": csv}})
         return
@@ -98,7 +99,8 @@ def plot(
     """
     from gfimu.commands.campaign_views import campaign_plot
 
-    drawn = campaign_plot(folder, out=out, result=result or [])
+    with progress("drawing"):
+        drawn = campaign_plot(folder, out=out, result=result or [])
     if json:
         print_json({"results": drawn, "files": {"picture": out}})
     else:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gfimu.cli.output import print_json, print_paths, print_table, print_text
+from gfimu.cli.output import print_json, print_paths, print_table, print_text, progress
 from gfimu.cli.shared_options import JsonOption, shared
 
 if TYPE_CHECKING:
@@ -62,9 +62,10 @@ def _certificate(
     from gfimu.certification.page import FILES
     from gfimu.commands.certificate import certificate
 
-    found = certificate(
-        calibration, out=out, compare=compare, stage=stage, array=array, rest=rest, item=item, date=date
-    )
+    with progress("stating the calibration"):
+        found = certificate(
+            calibration, out=out, compare=compare, stage=stage, array=array, rest=rest, item=item, date=date
+        )
     files = {} if out is None else {meaning: out / name for name, meaning in FILES.items()}
     if json:
         print_json(found.to_dict() | {"files": files})

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from gfimu.cli.output import print_json, print_table, print_text
+from gfimu.cli.output import print_json, print_table, print_text, progress
 from gfimu.cli.shared_options import JsonOption, MapOption, MapSetOption, TwinOption
 
 if TYPE_CHECKING:
@@ -41,7 +41,8 @@ def _check(
     """
     from gfimu.commands.check import check
 
-    found = check(runs, twin, column_map=column_map, map_set=map_set or [])
+    with progress("looking at the recordings"):
+        found = check(runs, twin, column_map=column_map, map_set=map_set or [])
     if json:
         print_json(found.to_dict())
     else:

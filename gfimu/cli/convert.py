@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from gfimu.cli import completion
-from gfimu.cli.output import print_json, print_paths, print_table
+from gfimu.cli.output import print_json, print_paths, print_table, progress
 from gfimu.cli.shared_options import JsonOption, MapOption, MapSetOption, shared
 
 if TYPE_CHECKING:
@@ -99,19 +99,20 @@ def _convert(
     from gfimu.geometry.array import AccelerometerArray
     from gfimu.recording import Recording
 
-    recording = convert(
-        source,
-        target,
-        array=array,
-        column_map=column_map,
-        map_set=map_set or [],
-        drop=drop,
-        table=table,
-        to=to,
-        lsb_m_s2=lsb_m_s2,
-        chip=chip,
-        noise=noise,
-    )
+    with progress("converting"):
+        recording = convert(
+            source,
+            target,
+            array=array,
+            column_map=column_map,
+            map_set=map_set or [],
+            drop=drop,
+            table=table,
+            to=to,
+            lsb_m_s2=lsb_m_s2,
+            chip=chip,
+            noise=noise,
+        )
     if isinstance(recording, AccelerometerArray):
         _print_array(recording, target, json=json)
         return

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from pathlib import Path
 from typing import Annotated
@@ -40,12 +41,15 @@ def _demo(
     from gfimu.commands.demo import demo
 
     began = time.perf_counter()
-    result = demo(
-        out,
-        seed=seed,
-        report=lambda number, total, what: print_text(f"{number}/{total} {what}", style="dim", stderr=True),
-    )
-    print_text(f"done in {time.perf_counter() - began:.0f} s", style="dim", stderr=True)
+    watched = sys.stderr.isatty()
+
+    def report(number: int, total: int, what: str) -> None:
+        if watched:
+            print_text(f"{number}/{total} {what}", style="dim", stderr=True)
+
+    result = demo(out, seed=seed, report=report)
+    if watched:
+        print_text(f"done in {time.perf_counter() - began:.0f} s", style="dim", stderr=True)
     if json:
         print_json(result.to_dict())
         return

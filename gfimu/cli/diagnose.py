@@ -19,9 +19,11 @@ from gfimu.cli.shared_options import (
     TwinOption,
     shared,
 )
+from gfimu.cli.stop_signals import INTERRUPTED
 from gfimu.errors import InputError
 
 if TYPE_CHECKING:
+    from gfimu.diagnosis.design.run_check import RunCheck
     from gfimu.diagnosis.verdict.verdict import Diagnosis
 
 __all__ = ["register"]
@@ -71,7 +73,7 @@ def _diagnose(
     """Show what a simulation gets wrong against recordings, name the cause, extend the simulation, measure the gain.
 
     Writes the verdict, the extended twin, a report for people and a rerun recording to a folder. The exit code is 0
-    whatever the verdict.
+    whatever the verdict. After Ctrl-C the result is what had been found by then, and the exit code 130.
 
     Examples
     --------
@@ -89,13 +91,21 @@ def _diagnose(
         from gfimu.cli.check import print_check
         from gfimu.commands.check import check as look
 
-        seen = look(runs, twin, column_map=column_map, map_set=map_set or [])
+        with progress("looking at the recordings"):
+            seen = look(runs, twin, column_map=column_map, map_set=map_set or [])
         print_json(seen.to_dict()) if json else print_check(seen)
         return
     if out is None:
         raise InputError("--out is missing: the folder for the diagnosis; --check needs none")
     from gfimu.commands.diagnose import diagnose
     from gfimu.diagnosis.report.folder import FILES
+
+    interrupted = False
+
+    def report(share: float, text: str | None = None) -> None:
+        nonlocal interrupted
+        interrupted = interrupted or text == "interrupted"
+        done(share, text)
 
     with progress("diagnosing", total=1.0) as done:
         found = diagnose(
@@ -109,27 +119,40 @@ def _diagnose(
             reference_map=reference_map,
             reference_map_set=reference_map_set or [],
             calibration=calibration,
-            report=done,
+            report=report,
             grammar=grammar,
             force=force,
         )
     written = {meaning: out / name for name, meaning in FILES.items()}
     if json:
         print_json(found.to_dict() | {"files": written})
-        return
-    _print_what_shows(runs, twin, column_map, map_set or [])
-    print_diagnosis(found)
-    print_paths(written.items())
+    else:
+        _print(found, runs, twin, column_map, map_set or [])
+        print_paths(written.items())
+    if interrupted:
+        print_text("gfimu: interrupted; the result is what had been found by then", stderr=True)
+        raise SystemExit(INTERRUPTED)
 
 
-def _print_what_shows(runs: list[Path], twin: str, column_map: str | None, map_set: list[str]) -> None:
-    """Print the data's quality and what the motion can show, before the verdict; nothing where that can't be read."""
+def _print(found: Diagnosis, runs: list[Path], twin: str, column_map: str | None, map_set: list[str]) -> None:
+    """Print what the recordings show, and the diagnosis."""
     from gfimu.cli.check import print_short_check
+
+    with progress("looking at the recordings"):
+        seen = _what_shows(runs, twin, column_map, map_set)
+    if seen is not None:
+        print_short_check(seen)
+    print_diagnosis(found)
+
+
+def _what_shows(runs: list[Path], twin: str, column_map: str | None, map_set: list[str]) -> RunCheck | None:
+    """Return the data's quality and what the motion can show; None where that can't be read."""
     from gfimu.commands.check import check as look
 
     with warnings.catch_warnings(), contextlib.suppress(InputError):  # the diagnosis reports both itself
         warnings.simplefilter("ignore")
-        print_short_check(look(runs, twin, column_map=column_map, map_set=map_set))
+        return look(runs, twin, column_map=column_map, map_set=map_set)
+    return None
 
 
 def print_diagnosis(found: Diagnosis) -> None:

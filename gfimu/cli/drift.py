@@ -108,18 +108,19 @@ def _drift(
                 f"{run}: the drift of a recording goes with --array, --calibration, --duration, --lead, --gravity, "
                 "--picture, --map and --force; its noise is measured"
             )
-        seen = drift_of_rest(
-            run,
-            array,
-            duration=duration,
-            lead=10.0 if lead is None else lead,
-            gravity=gravity,
-            calibration=calibration,
-            picture=picture,
-            column_map=column_map,
-            map_set=map_set or [],
-            force=force,
-        )
+        with progress("navigating through the rests"):
+            seen = drift_of_rest(
+                run,
+                array,
+                duration=duration,
+                lead=10.0 if lead is None else lead,
+                gravity=gravity,
+                calibration=calibration,
+                picture=picture,
+                column_map=column_map,
+                map_set=map_set or [],
+                force=force,
+            )
         files = {} if picture is None else {"picture": picture}
         if json:
             print_json(seen.to_dict() | {"files": files})

@@ -191,7 +191,8 @@ def _build(
         if not equals or not name.isidentifier():
             raise InputError(f"--define {item!r}: write NAME=VALUE")
         defines[name] = value
-    report = build(image, out=out, array=array, baud=baud, define=defines)
+    with progress("compiling"):
+        report = build(image, out=out, array=array, baud=baud, define=defines)
     if json:
         print_json(asdict(report) | {"files": {"ELF file": report.elf, "image": report.binary}})
         return
@@ -221,7 +222,8 @@ def _selftest(json: JsonOption = False) -> None:
     """
     from gfimu.commands.firmware import selftest
 
-    rows = selftest()
+    with progress("testing the emulator and the firmware"):
+        rows = selftest()
     if json:
         print_json({"passed": all(row.passed for row in rows), "checks": [asdict(row) for row in rows]})
     else:
@@ -251,7 +253,8 @@ def _trace(
     """
     from gfimu.commands.firmware import trace
 
-    found = trace(out, scenario=scenario, duration=duration, skip=skip, rate=rate, seed=seed, image=image)
+    with progress(f"tracing {image}"):
+        found = trace(out, scenario=scenario, duration=duration, skip=skip, rate=rate, seed=seed, image=image)
     if json:
         print_json({"events": found.events, "exceptions": found.exceptions, "files": {"trace": out}})
         return

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from gfimu.cli import completion
-from gfimu.cli.output import print_json, print_table, print_text
+from gfimu.cli.output import print_json, print_table, print_text, progress
 from gfimu.cli.shared_options import JsonOption, shared
 
 if TYPE_CHECKING:
@@ -49,7 +49,8 @@ def check(
     """
     from gfimu.commands.firmware import check as check_image
 
-    report = check_image(image, duration=duration, chips=chips, baud=baud, time_limit=time_limit)
+    with progress(f"running {image}"):
+        report = check_image(image, duration=duration, chips=chips, baud=baud, time_limit=time_limit)
     if json:
         print_json(asdict(report) | {"faults": report.faults})
     else:

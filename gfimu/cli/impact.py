@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from gfimu.cli import completion
-from gfimu.cli.output import print_json, print_paths, print_table, print_text
+from gfimu.cli.output import print_json, print_paths, print_table, print_text, progress
 from gfimu.cli.shared_options import ForceOption, JsonOption, MapOption, MapSetOption, PictureOption, shared
 
 if TYPE_CHECKING:
@@ -69,21 +69,22 @@ def _impact(
     """
     from gfimu.commands.impact import impact
 
-    found = impact(
-        recording,
-        array,
-        cfc=cfc,
-        standard=standard,
-        threshold_g=threshold_g,
-        direction=direction,
-        calibration=calibration,
-        column_map=column_map,
-        map_set=map_set or [],
-        out=out,
-        estimate=estimate,
-        picture=picture,
-        force=force,
-    )
+    with progress("measuring the impact"):
+        found = impact(
+            recording,
+            array,
+            cfc=cfc,
+            standard=standard,
+            threshold_g=threshold_g,
+            direction=direction,
+            calibration=calibration,
+            column_map=column_map,
+            map_set=map_set or [],
+            out=out,
+            estimate=estimate,
+            picture=picture,
+            force=force,
+        )
     named = (("recording", out), ("estimate", estimate), ("picture", picture))
     files = {name: path for name, path in named if path is not None}
     if json:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gfimu.cli.output import print_json, print_paths, print_table, print_text
+from gfimu.cli.output import print_json, print_paths, print_table, print_text, progress
 from gfimu.cli.shared_options import JsonOption, shared
 
 if TYPE_CHECKING:
@@ -47,7 +47,8 @@ def _inspect(
     """
     from gfimu.commands.inspect import inspect
 
-    found = inspect(file, table=table, out=out)
+    with progress("looking at the file"):
+        found = inspect(file, table=table, out=out)
     if json:
         print_json(found.to_dict() | {"files": {} if out is None else {"map": out}})
         return

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gfimu.cli.output import print_json, print_paths, print_table, print_text
+from gfimu.cli.output import print_json, print_paths, print_table, print_text, progress
 from gfimu.cli.shared_options import JsonOption, MapOption, MapSetOption, ReferenceMapSetOption, shared
 
 if TYPE_CHECKING:
@@ -51,18 +51,19 @@ def _join(
     """
     from gfimu.commands.join import join
 
-    found = join(
-        channels,
-        reference,
-        out=out,
-        array=array,
-        column_map=column_map,
-        map_set=map_set or [],
-        reference_map=reference_map,
-        reference_map_set=reference_map_set or [],
-        most_rate_error=most_rate_error,
-        force=force,
-    )
+    with progress("searching the offset between the clocks"):
+        found = join(
+            channels,
+            reference,
+            out=out,
+            array=array,
+            column_map=column_map,
+            map_set=map_set or [],
+            reference_map=reference_map,
+            reference_map_set=reference_map_set or [],
+            most_rate_error=most_rate_error,
+            force=force,
+        )
     if json:
         print_json(found.to_dict() | {"files": {"recording": out}})
         return

@@ -10,7 +10,7 @@ import typer
 
 from gfimu.cli import completion
 from gfimu.cli.axis_options import AxisOption, AxisPointOption, HubOption
-from gfimu.cli.output import print_json, print_paths, print_table
+from gfimu.cli.output import print_json, print_paths, print_table, progress
 from gfimu.cli.shared_options import ForceOption, JsonOption, MapOption, MapSetOption, PictureOption, shared
 
 __all__ = ["register"]
@@ -61,22 +61,23 @@ def _noise(
     from gfimu.commands.noise import noise
     from gfimu.sensor_noise.identification import TERMS
 
-    result = noise(
-        run,
-        column_map=column_map,
-        map_set=map_set or [],
-        stretch=stretch,
-        rest_threshold=rest_threshold,
-        calibration=calibration,
-        kalibr=kalibr,
-        picture=picture,
-        array=array,
-        axis=axis,
-        axis_point=axis_point,
-        hub=hub,
-        speed_rad_s=speed,
-        force=force,
-    )
+    with progress("identifying the noise"):
+        result = noise(
+            run,
+            column_map=column_map,
+            map_set=map_set or [],
+            stretch=stretch,
+            rest_threshold=rest_threshold,
+            calibration=calibration,
+            kalibr=kalibr,
+            picture=picture,
+            array=array,
+            axis=axis,
+            axis_point=axis_point,
+            hub=hub,
+            speed_rad_s=speed,
+            force=force,
+        )
     written = {} if kalibr is None else {"Kalibr": kalibr}
     written |= {} if picture is None else {"picture": picture}
     if json:

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import json
 import math
+import os
+import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -83,15 +85,19 @@ def print_paths(paths: Iterable[tuple[str, str | Path]]) -> None:
 def progress(description: str, total: float | None = None, *, time_left: bool = True) -> Iterator[Any]:
     """Show a progress bar on a terminal; yields a function called with the work done so far (0 to ``total``).
 
+    Without ``total`` the bar moves but does not say how far the work is. In a pipe nothing is shown.
     Without ``time_left`` the bar shows none: where some of the work was done before, its rate is not that of this call.
     """
+    if not sys.stderr.isatty() and not os.environ.get("FORCE_COLOR"):  # a pipe: rich need not be loaded
+        yield lambda done, text=None: None
+        return
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
     screen = console(stderr=True)
     with Progress(
         TextColumn("{task.description}", markup=False),
         BarColumn(),
-        *([TimeRemainingColumn()] if time_left else []),
+        *([TimeRemainingColumn()] if time_left and total is not None else []),
         console=screen,
         transient=True,
         disable=not screen.is_terminal,

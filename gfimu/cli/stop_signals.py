@@ -30,6 +30,8 @@ class Stop:
             os.kill(os.getpid(), number)
             return
         self.received = number
+        if number == signal.SIGTERM:  # no KeyboardInterrupt, by which a search reports what it has found so far
+            raise SystemExit(self.code)
         raise KeyboardInterrupt
 
     @property
@@ -45,13 +47,17 @@ class Stop:
 
 @contextmanager
 def stop_signals() -> Iterator[Stop]:
-    """Let SIGTERM end the program as Ctrl-C does while the block runs."""
+    """Note which signal ends the program while the block runs, and let SIGTERM do so as Ctrl-C does."""
     stop = Stop()
     if threading.current_thread() is not threading.main_thread() or sys.platform == "win32":
         yield stop
         return
-    before = signal.signal(signal.SIGTERM, stop)
+    numbers = [signal.SIGTERM]
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # a shell's background job ignores it
+        numbers.append(signal.SIGINT)
+    before = [signal.signal(number, stop) for number in numbers]
     try:
         yield stop
     finally:
-        signal.signal(signal.SIGTERM, before)
+        for number, handler in zip(numbers, before, strict=True):
+            signal.signal(number, handler)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from gfimu.cli.axis_options import AxisOption, AxisPointOption, HubOption, InclinationOption
-from gfimu.cli.output import print_json, print_paths
+from gfimu.cli.output import print_json, print_paths, progress
 from gfimu.cli.shared_options import ForceOption, JsonOption, MapOption, MapSetOption, shared
 
 __all__ = ["register"]
@@ -54,26 +55,30 @@ def _view(
     from gfimu.commands.view import view
 
     shown: list[Path] = []
+    bar = ExitStack()
 
     def show(picture: Path) -> None:
+        bar.close()  # the viewer stays open as long as its user likes
         shown.append(picture)
         if json:
             print_json({"files": {"rerun recording": picture}})
         else:
             print_paths([("rerun recording", picture)])
 
-    picture = view(
-        file,
-        array=array,
-        column_map=column_map,
-        map_set=map_set or [],
-        axis=axis,
-        axis_point=axis_point,
-        hub=hub,
-        inclination_rad=inclination_rad,
-        out=out,
-        force=force,
-        on_picture=show,
-    )
+    with bar:
+        bar.enter_context(progress("making the picture"))
+        picture = view(
+            file,
+            array=array,
+            column_map=column_map,
+            map_set=map_set or [],
+            axis=axis,
+            axis_point=axis_point,
+            hub=hub,
+            inclination_rad=inclination_rad,
+            out=out,
+            force=force,
+            on_picture=show,
+        )
     if json and not shown:  # the file is a picture itself
         show(picture)

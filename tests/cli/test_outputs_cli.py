@@ -69,7 +69,7 @@ CALLS = {
     "demo": {},
     "new": {"kind": "array", "out": "made.toml"},
     "schema": {"command": "score", "out": "made.json"},
-    "tolerance": {"array": "cube12", "units": "10", "workers": "1", "picture": "made.png"},
+    "tolerance": {"array": "cube12", "units": "10", "workers": "1"},
     "campaign": {"plan": "in.toml", "out": "made"},
     "campaign table": {"folder": "campaign"},
     "campaign plot": {"folder": "campaign", "out": "made.png"},
