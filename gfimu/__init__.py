@@ -64,6 +64,7 @@ if TYPE_CHECKING:
     from gfimu.commands.noise import noise as noise
     from gfimu.commands.optimize import optimize as optimize
     from gfimu.commands.record import record as record
+    from gfimu.commands.schema import schema as schema
     from gfimu.commands.score import score as score
     from gfimu.commands.simulate import simulate as simulate
     from gfimu.commands.tolerance import tolerance as tolerance
@@ -175,6 +176,7 @@ _PUBLIC = {
     "read_mimu4444": "gfimu.recording.mimu4444",
     "record": "gfimu.commands.record",
     "recording_noise": "gfimu.sensor_noise",
+    "schema": "gfimu.commands.schema",
     "score": "gfimu.commands.score",
     "show": "gfimu.commands.catalogue",
     "simulate": "gfimu.commands.simulate",

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from gfimu.commands.former_arguments import former_arguments
 from gfimu.files.outputs import PICTURE, writes
 
 if TYPE_CHECKING:
@@ -19,12 +20,13 @@ if TYPE_CHECKING:
 __all__ = ["drift_of_rest"]
 
 
+@former_arguments(time="duration")
 @writes(reads=("recording", "array", "calibration", "column_map"), picture=PICTURE)
 def drift_of_rest(
     recording: Recording | str | Path | MappedFile,
     array: AccelerometerArray | str | Path | None = None,
     *,
-    time: float = 30.0,
+    duration: float = 30.0,
     lead: float = 10.0,
     gravity: float = 9.80665,
     calibration: Calibration | str | Path | None = None,
@@ -38,10 +40,10 @@ def drift_of_rest(
     Parameters
     ----------
     recording : Recording, str or Path
-        The recording, or its file, with a rest of ``lead + time`` or more.
+        The recording, or its file, with a rest of ``lead + duration`` or more.
     array : AccelerometerArray, str or Path, optional
         The array, its name or file; the recording's own by default.
-    time, lead : float
+    duration, lead : float
         Time of navigation, and of the rest before it from which tilt and biases are read off, s.
     gravity : float
         Local gravity, m/s².
@@ -71,7 +73,7 @@ def drift_of_rest(
     run, geometry = as_calibrated_run(by_map(recording, column_map, map_set), array, calibration)
     examine(run, geometry, source=name_of(recording), force=force, whose="" if array is None else "the given")
     with naming(name_of(recording)):
-        found = rest_drift(run, geometry, time=time, lead=lead, gravity=gravity)
+        found = rest_drift(run, geometry, time=duration, lead=lead, gravity=gravity)
     if picture is not None:
         from gfimu.position_drift.pictures import rest_drift_picture
 

@@ -8,6 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from gfimu.commands.former_arguments import former_arguments
+
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
@@ -23,6 +25,7 @@ _FASTEST = 1e6  # rad/s
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
+@former_arguments(duration_s="duration", sample_rate_hz="rate")
 def score(
     arrays: AccelerometerArray | str | Path | Sequence[AccelerometerArray | str | Path] | None = None,
     *,
@@ -34,14 +37,14 @@ def score(
     axis: TurningAxis | str | Sequence[float] | None = None,
     axis_point: Sequence[float] = (0.0, 0.0, 0.0),
     hub: str = "fixed",
-    sample_rate_hz: float = 100.0,
+    rate: float = 100.0,
     inclination_rad: float | None = None,
     point_std_m: float = 0.0,
     direction_std_rad: float = 0.0,
     lever_std_m: float = 0.0,
     rotation_std_rad: float = 0.0,
     bias_std_m_s2: float = 0.0,
-    duration_s: float = 60.0,
+    duration: float = 60.0,
     hub_std_m_s2: float = 0.7,
     jerk_rad2_s5: float = 1.0,
     fault_time_s: float = 1.0,
@@ -73,14 +76,14 @@ def score(
         A point of that axis, body frame, m.
     hub : {"fixed", "free"}
         Whether that axis stands still (a table) or moves with a body (a wheel).
-    sample_rate_hz : float
+    rate : float
         Sample rate at which the least faults, and the bound of a filter about that axis, hold.
     inclination_rad : float, optional
         Angle between that axis and the vertical, rad; by default a fixed one is upright, a free one level.
     point_std_m, direction_std_rad, lever_std_m, rotation_std_rad, bias_std_m_s2 : float
         How exactly axis, places, orientations and biases of the chips are known
         (`gfimu.geometry.turning_axis.AxisUncertainty`); where all are 0, those of the array file hold.
-    duration_s, hub_std_m_s2, jerk_rad2_s5 : float
+    duration, hub_std_m_s2, jerk_rad2_s5 : float
         The run for which the estimate's standard deviation is predicted
         (`gfimu.known_axis.accuracy.predicted.PredictedRun`).
     fault_time_s : float
@@ -125,11 +128,11 @@ def score(
     if len(seeing) < len(given_axes):  # the others don't wait for a compiler
         from gfimu.known_axis.accuracy.predicted import PredictedRun
 
-        run = PredictedRun(duration_s, sample_rate_hz, hub_std_m_s2, jerk_rad2_s5)
+        run = PredictedRun(duration, rate, hub_std_m_s2, jerk_rad2_s5)
     for array, about in given_axes:
         if about is None:
             faults = fault_protection(
-                array, noise_m_s2=noise_m_s2, sample_rate_hz=sample_rate_hz, duration_s=fault_time_s,
+                array, noise_m_s2=noise_m_s2, sample_rate_hz=rate, duration_s=fault_time_s,
                 per_channel=per_channel,
             )  # fmt: skip
             found.append(replace(next(scores), protection=faults))

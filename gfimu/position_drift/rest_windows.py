@@ -182,7 +182,7 @@ def rest_drift(
     GeometryError
         If the array can't see all six motions.
     """
-    for name, value in (("--time", time), ("--lead", lead)):
+    for name, value in (("--duration", time), ("--lead", lead)):
         if not 2.0 <= value * recording.sample_rate < math.inf:
             raise InputError(f"{name} is {value:g} s; it must be two samples or more ({2 / recording.sample_rate:g} s)")
     if not 0.0 < gravity < math.inf:
@@ -314,7 +314,7 @@ def _windows(recording: Recording, readings: Floats, samples: int) -> list[int]:
     if not starts:
         longest = float(rest.lengths.max(initial=0)) / recording.sample_rate
         raise InputError(
-            f"no complete rest of {samples / recording.sample_rate:.4g} s (--lead and --time together); the longest is "
-            f"{longest:.4g} s: record longer at rest, or give a shorter --time or --lead"
+            f"no complete rest of {samples / recording.sample_rate:.4g} s (--lead and --duration together); the "
+            f"longest is {longest:.4g} s: record longer at rest, or give a shorter --duration or --lead"
         )
     return starts

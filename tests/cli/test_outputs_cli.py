@@ -68,6 +68,7 @@ CALLS = {
     "optimize": {"chips": "4", "restarts": "1"},
     "demo": {},
     "new": {"kind": "array", "out": "made.toml"},
+    "schema": {"command": "score", "out": "made.json"},
     "tolerance": {"array": "cube12", "units": "10", "workers": "1"},
     "campaign": {"plan": "in.toml", "out": "made"},
     "campaign table": {"folder": "campaign"},
