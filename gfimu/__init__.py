@@ -52,6 +52,7 @@ if TYPE_CHECKING:
     from gfimu.commands.demo import demo as demo
     from gfimu.commands.design import design as design
     from gfimu.commands.diagnose import diagnose as diagnose
+    from gfimu.commands.diagnose import write_report as write_report
     from gfimu.commands.drift import axis_drift as axis_drift
     from gfimu.commands.drift import drift as drift
     from gfimu.commands.drift import drift_from_position as drift_from_position
@@ -104,7 +105,7 @@ if TYPE_CHECKING:
     from gfimu.recording.mimu4444 import read_mimu4444 as read_mimu4444
     from gfimu.sensor_noise import allan_deviation as allan_deviation
     from gfimu.sensor_noise import identify_noise as identify_noise
-    from gfimu.sensor_noise import recording_noise as recording_noise
+    from gfimu.sensor_noise.recording_noise import recording_noise as recording_noise
 
 __version__ = "0.1.0"
 
@@ -174,7 +175,7 @@ _PUBLIC = {
     "rate_bound": "gfimu.bounds.sample",
     "read_mimu4444": "gfimu.recording.mimu4444",
     "record": "gfimu.commands.record",
-    "recording_noise": "gfimu.sensor_noise",
+    "recording_noise": "gfimu.sensor_noise.recording_noise",
     "score": "gfimu.commands.score",
     "show": "gfimu.commands.catalogue",
     "simulate": "gfimu.commands.simulate",
@@ -183,6 +184,7 @@ _PUBLIC = {
     "tolerance": "gfimu.commands.tolerance",
     "update_array_calibration": "gfimu.calibration.array_calibration",
     "view": "gfimu.commands.view",
+    "write_report": "gfimu.commands.diagnose",
 }
 """Public names and the modules that hold them."""
 
