@@ -181,7 +181,8 @@ class Calibration(PlottedResult):
             if not places:
                 continue
             ideal = 1.0 if title == "sensitivity" and self.unit != "lsb" else 0.0
-            label = f"{title}, {self.units[places[0]]}" if not ideal else f"{title} less 1"
+            unit = self.units[places[0]].replace("m_s2", "m/s²").replace("rad_s", "rad/s")
+            label = f"{title} less 1" if ideal else f"{title}, {unit}" if unit != "1" else title
             series = Series("", self.values[places] - ideal, self.std[places])
             panels.append(Panel(f"{title}, ±2σ", label, (series,), tuple(self.names[place] for place in places)))
         return panels

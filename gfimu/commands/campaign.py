@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from numpy.typing import NDArray
 
 from gfimu.files.outputs import OutputFolder, writes
-from gfimu.results import MOST_ROWS, Panel, PlottedResult, result_html
+from gfimu.results import Panel, PlottedResult, result_html
 
 if TYPE_CHECKING:
     from sim.sweep.summary import Group
@@ -63,9 +63,7 @@ class CampaignResult(PlottedResult):
     def _repr_html_(self) -> str:
         from gfimu.commands.campaign_views import group_columns
 
-        columns = group_columns(self.groups)
-        shown = columns if 0 < len(self.groups) <= MOST_ROWS else None
-        return result_html(self._heading(), self._facts(), shown)
+        return result_html(self._heading(), self._facts(), group_columns(self.groups))
 
     def _panels(self) -> list[Panel]:
         from gfimu.commands.campaign_views import group_panels

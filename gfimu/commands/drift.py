@@ -69,7 +69,7 @@ class Drift(PlottedResult):
                 for place, axis in enumerate("xyz")
             )
             title = f"position error of {found.runs} simulated runs"
-            panels.append(Panel(title, "σ, m", series, found.t_s, "time, s", from_zero=True))
+            panels.append(Panel(title, "σ, m", series, found.t_s, "time, s", scale="zero"))
         return panels
 
     def to_dict(self) -> dict[str, Any]:

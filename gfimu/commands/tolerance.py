@@ -113,7 +113,7 @@ class ToleranceResult(PlottedResult):
                 for key, one in self.budgets.items()
             )
             title = f"error of {name.replace('_', ' ')}, by cause"
-            panels.append(Panel(title, f"rms, {quantity.unit}", series, causes, from_zero=True))
+            panels.append(Panel(title, f"rms, {quantity.unit}", series, causes, scale="log"))
         return panels
 
     def to_dict(self) -> dict[str, Any]:

@@ -255,10 +255,10 @@ def score_panels(scores: Sequence[Score]) -> list[Panel]:
             "σ per unit of channel noise\n(length unit of the array)",
             sigma,
             components,
-            from_zero=True,
+            scale="zero",
         ),
-        Panel("figures of merit", "pure number", merit, names, from_zero=True),
-        Panel("rate bound of one sample", "σ of ω, rad/s", bound, ("ωx", "ωy", "ωz"), from_zero=True),
+        Panel("figures of merit", "pure number", merit, names, scale="zero"),
+        Panel("rate bound of one sample", "σ of ω, rad/s", bound, ("ωx", "ωy", "ωz"), scale="zero"),
     ]
 
 

@@ -163,8 +163,9 @@ class DriftBudget(PlottedResult):
     def _panels(self) -> list[Panel]:
         names = (*(term.name for term in self.terms), "total")
         std = np.vstack([*(term.std for term in self.terms), self.total_std])
+        std = np.where(std > 0.0, std, np.nan)
         series = tuple(Series(axis, std[:, place], role=axis) for place, axis in enumerate("xyz"))
-        return [Panel(f"position error after {self.time:g} s, by cause", "σ, m", series, names, from_zero=True)]
+        return [Panel(f"position error after {self.time:g} s, by cause", "σ, m", series, names, scale="log")]
 
     @property
     def total_std(self) -> NDArray[np.float64]:

@@ -34,6 +34,10 @@ _BARE = re.compile(r"[A-Za-z]+[0-9]+")  # a channel's name without a unit
 _UNIT_WORDS = {"m_s2": "m/s²", "lsb": "counts"}
 
 
+def _few(names: list[str]) -> str:
+    return ", ".join(names) if len(names) <= 4 else f"{', '.join(names[:3])} and {len(names) - 3} more"
+
+
 @dataclass(frozen=True)
 class Recording(PlottedResult):
     """Samples of an accelerometer array and its references.
@@ -98,7 +102,7 @@ class Recording(PlottedResult):
             ("channels", f"{len(self.channels)} in {_UNIT_WORDS.get(self.unit, self.unit)}"),
             ("samples", timing(self.t_s)),
             ("references", ", ".join(self.reference) or "none"),
-            ("further columns", ", ".join(self.extra)),
+            ("further columns", _few(list(self.extra))),
             ("lost", f"{gaps} gaps in time" if gaps else ""),
             ("corrupt values left out", str(corrupt) if corrupt else ""),
         ]

@@ -59,8 +59,10 @@ def _draw(axes: Any, panel: Panel) -> None:
     axes.set_title(panel.title, fontsize=10)
     axes.set_ylabel(panel.y_label)
     (_draw_names if panel.by_name else _draw_lines)(axes, panel)
-    if panel.from_zero:
-        axes.set_ylim(bottom=0.0)
+    if panel.scale == "zero":
+        axes.set_ylim(bottom=0.0, top=1.05 * axes.get_ylim()[1])
+    elif panel.scale == "log":
+        axes.set_yscale("log")
     axes.grid(which="major", linewidth=0.4, alpha=0.6)
     named = [one.name for one in panel.series if one.name]
     if 0 < len(named) <= _LONGEST_LEGEND and (len(panel.series) > 1 or not panel.by_name):
@@ -79,9 +81,8 @@ def _draw_lines(axes: Any, panel: Panel) -> None:
             t, y, _STYLES.get(series.style, "-"), color=colour, linewidth=1.1, label=_label(series) or "_", zorder=3
         )
     axes.set_xlabel(panel.x_label)
-    if panel.logarithmic:
+    if panel.scale == "log":
         axes.set_xscale("log")
-        axes.set_yscale("log")
 
 
 def _draw_names(axes: Any, panel: Panel) -> None:

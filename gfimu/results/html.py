@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 __all__ = ["MOST_ROWS", "result_html"]
 
-MOST_ROWS = 30
-"""Rows of a table that is shown whole; a longer one is for `to_pandas`."""
+MOST_ROWS = 24
+"""Rows of a table that are shown; the others are for `to_pandas`."""
 
 # No colour of ink or paper is set: the notebook's own hold, light or dark. Rules are half transparent for the same end.
 _RULE = "1px solid rgba(128,128,128,0.45)"
@@ -52,11 +52,16 @@ def result_html(
 def _table(columns: Mapping[str, NDArray[Any]]) -> str:
     sides = {name: "right" if values.dtype.kind in "fiu" else "left" for name, values in columns.items()}
     head = "".join(_cell(name, scope="col", side=sides[name]) for name in columns)
-    texts = {name: [_text(value) for value in values.tolist()] for name, values in columns.items()}
+    texts = {name: [_text(value) for value in values[:MOST_ROWS].tolist()] for name, values in columns.items()}
     body = "".join(
         "<tr>" + "".join(_cell(text, side=sides[name]) for name, text in zip(texts, row, strict=True)) + "</tr>"
         for row in zip(*texts.values(), strict=True)
     )
+    more = max((len(values) for values in columns.values()), default=0) - MOST_ROWS
+    if more > 0:
+        body += (
+            f'<tr><td colspan="{len(columns)}" style="opacity:0.75">… {more} more rows: to_pandas() has all</td></tr>'
+        )
     return (
         f'<table style="{_TABLE}"><thead style="border-bottom:{_RULE}"><tr>{head}</tr></thead>'
         f"<tbody>{body}</tbody></table>"

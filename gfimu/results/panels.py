@@ -58,10 +58,8 @@ class Panel:
         Numbers along a line, or names: then each value is a dot with its bar.
     x_label : str
         Quantity and unit along the line.
-    logarithmic : bool
-        Whether both scales are logarithmic.
-    from_zero : bool
-        Whether the scale of the values begins at zero.
+    scale : {"linear", "zero", "log"}
+        ``zero``: the values' axis begins at zero. ``log``: it is logarithmic, and so is the axis along a line.
     """
 
     title: str
@@ -69,8 +67,7 @@ class Panel:
     series: tuple[Series, ...]
     x: NDArray[np.float64] | tuple[str, ...]
     x_label: str = "time, s"
-    logarithmic: bool = False
-    from_zero: bool = False
+    scale: str = "linear"
 
     @property
     def by_name(self) -> bool:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from numpy.typing import NDArray
 
 from gfimu.errors import GfimuError
-from gfimu.results.html import MOST_ROWS, result_html
+from gfimu.results.html import result_html
 from gfimu.results.panels import Panel
 
 if TYPE_CHECKING:
@@ -97,8 +97,8 @@ class TableResult(ABC):
 
     def _repr_html_(self) -> str:
         columns = self.to_columns()
-        rows = max((len(values) for values in columns.values()), default=0)
-        return result_html(self._heading(), self._facts(), columns if 0 < rows <= MOST_ROWS else None, self._notes())
+        shown = None if "t_s" in columns else columns  # samples are for a picture
+        return result_html(self._heading(), self._facts(), shown, self._notes())
 
 
 class PlottedResult(TableResult):

@@ -93,9 +93,7 @@ class RecordingNoise(PlottedResult):
             )
             if series:
                 label = f"Allan deviation, {unit}"
-                panels.append(
-                    Panel(f"{title} at rest", label, series, np.empty(0), "averaging time τ, s", logarithmic=True)
-                )
+                panels.append(Panel(f"{title} at rest", label, series, np.empty(0), "averaging time τ, s", scale="log"))
         return panels
 
     def sample_std(self, channels: Sequence[str]) -> NDArray[np.float64]:

@@ -122,7 +122,7 @@ class RunCheck(PlottedResult):
         names = tuple(one.name for one in self.effects)
         sizes = Series("", np.array([one.detectability for one in self.effects], dtype=float))
         return [
-            Panel("detectability of effects of usual size", "d′, standard deviations", (sizes,), names, from_zero=True)
+            Panel("detectability of effects of usual size", "d′, standard deviations", (sizes,), names, scale="zero")
         ]
 
     def to_dict(self) -> dict[str, Any]:

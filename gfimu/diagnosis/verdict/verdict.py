@@ -284,7 +284,7 @@ class Diagnosis(PlottedResult):
             Series(name, np.array([found[channel] for channel in channels]), role=role)
             for name, found, role in by_channel
         )
-        panels = [Panel("residual of each channel", "rms, m/s²", sizes, channels, from_zero=True)]
+        panels = [Panel("residual of each channel", "rms, m/s²", sizes, channels, scale="zero")]
         if self.runs and channels:
             panels.append(self._worst_channel(channels))
         return panels

@@ -85,7 +85,7 @@ class AxisBounds(PlottedResult):
         values = np.array([self.sample_std, self.filter_std])
         series = Series("", np.where(np.isfinite(values), values, np.nan))
         title = f"bounds on the rate at {self.rate_rad_s:.3g} rad/s"
-        return [Panel(title, "σ of the rate, rad/s", (series,), ("one sample", "filter, settled"), from_zero=True)]
+        return [Panel(title, "σ of the rate, rad/s", (series,), ("one sample", "filter, settled"), scale="zero")]
 
     def to_dict(self) -> dict[str, Any]:
         """Return the bounds as JSON holds them."""

@@ -95,7 +95,7 @@ class AxisDrift(PlottedResult):
         columns, total = self.to_columns(), self.total
         names = (*(one.name for one in self.terms), "total")
         return [
-            Panel(title, label, (Series("", np.append(columns[key], whole)),), names, from_zero=True)
+            Panel(title, label, (Series("", np.append(columns[key], whole)),), names, scale="zero")
             for title, label, key, whole in (
                 ("rate error at the end, by cause", "σ, rad/s", "rate_std_rad_s", total[0]),
                 ("angle error at the end, by cause", "σ, rad", "angle_std_rad", total[1]),
