@@ -142,7 +142,7 @@ if TYPE_CHECKING:
     from sim.scenarios import Scenario as Scenario
     from sim.twin import Twin as Twin
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _PUBLIC = {
     "Score": "gfimu.geometry.scoring",

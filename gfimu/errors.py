@@ -12,7 +12,10 @@ __all__ = [
     "CorruptValueWarning",
     "GeometryError",
     "GfimuError",
+    "GfimuWarning",
     "InputError",
+    "MissingPackageError",
+    "OmittedFileWarning",
     "RecordingWarning",
     "UnitError",
     "WriteError",
@@ -40,6 +43,10 @@ class InputError(GfimuError, ValueError):
     """A file or value that can't be used as given; commands end with exit code 2."""
 
 
+class MissingPackageError(InputError, ImportError):
+    """A package that gfimu runs without is needed and not installed; the message holds the command to install it."""
+
+
 class WriteError(GfimuError, OSError):
     """A file that could not be written, on a full disk say; what stood in its place is as it was."""
 
@@ -57,8 +64,16 @@ class GeometryError(InputError):
     """A sensor geometry that can't see the motions asked for."""
 
 
-class RecordingWarning(UserWarning):
-    """Something about a recording that a user should know, though it can be used; commands print it as one line."""
+class GfimuWarning(UserWarning):
+    """Something that a user should know, though the work goes on; commands print it as one line."""
+
+
+class OmittedFileWarning(GfimuWarning):
+    """A file of a result is not written, as a package is not installed; the message holds the command to install it."""
+
+
+class RecordingWarning(GfimuWarning):
+    """Something about a recording that a user should know, though it can be used."""
 
 
 class CorruptValueWarning(RecordingWarning):

@@ -239,6 +239,7 @@ COMMON = {
     "gfimu.short_repr",
     "gfimu.lazy_names",
     "gfimu.results",
+    "gfimu.optional_packages",
 }
 """Modules that every room may import; of `gfimu` itself the version."""
 
@@ -514,6 +515,7 @@ def test_few_modules_are_in_no_room():
         "gfimu.errors",
         "gfimu.generic_basis",
         "gfimu.lazy_names",
+        "gfimu.optional_packages",
         "gfimu.plugins",
         "gfimu.short_repr",
         "gfimu.units",

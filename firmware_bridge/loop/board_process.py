@@ -6,7 +6,6 @@ with the caller and is asked for in batches.
 
 from __future__ import annotations
 
-import importlib.util
 import multiprocessing
 import sys
 import threading
@@ -23,21 +22,19 @@ from firmware_bridge.adxl345.registers import TICKS_PER_SECOND, Adxl345Options, 
 from firmware_bridge.loop.physics import Conversions, RestPhysics
 from firmware_bridge.lpc1768.build import IMAGES, image_path
 from gfimu.errors import GfimuError, InputError
+from gfimu.optional_packages import missing, require
 
 __all__ = ["BoardProcess", "emulator_available", "require_emulator"]
-
-_NEEDED = "the emulated board needs unicorn, which is not installed; pip install 'gfimu[firmware]'"
 
 
 def emulator_available() -> bool:
     """Whether the emulator is installed."""
-    return importlib.util.find_spec("unicorn") is not None
+    return not missing("unicorn")
 
 
 def require_emulator() -> None:
     """Raise `InputError` that says what to install when the emulator is missing."""
-    if not emulator_available():
-        raise InputError(_NEEDED)
+    require("the emulated board", "unicorn")
 
 
 class BoardProcess:
@@ -81,7 +78,7 @@ class BoardProcess:
         path = image_path(str(image)) if str(image) in IMAGES else Path(image)
         if not path.is_file():
             raise InputError(f"{image}: no such image; valid: {', '.join(IMAGES)}, or the path of an ELF file")
-        compiled = importlib.util.find_spec("ziglang") is not None
+        compiled = not missing("ziglang")
         self.fast = (compiled if fast is None else fast) and not trace and not lose_every
         self._conversions = conversions or RestPhysics()
         self._calling = threading.Lock()  # one thread may serve a port while another presses reset

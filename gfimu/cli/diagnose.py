@@ -89,7 +89,7 @@ def _diagnose(
     if out is None:
         raise InputError("--out is missing: the folder for the diagnosis; --check needs none")
     from gfimu.commands.diagnose import diagnose
-    from gfimu.diagnosis.report.folder import FILES
+    from gfimu.diagnosis.report.folder import files_to_write
 
     with progress("diagnosing", total=1.0) as done:
         found = diagnose(
@@ -107,7 +107,7 @@ def _diagnose(
             grammar=grammar,
             force=force,
         )
-    written = {meaning: out / name for name, meaning in FILES.items()}
+    written = {meaning: out / name for name, meaning in files_to_write().items()}
     if json:
         print_json(found.to_dict() | {"files": written})
         return

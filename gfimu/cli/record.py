@@ -186,7 +186,7 @@ def _ask_for_array(candidates: tuple[AccelerometerArray, ...]) -> str:
     from gfimu.errors import InputError
     from gfimu.geometry.array import AccelerometerArray
 
-    print_text("The board does not state how its chips are mounted (docs/bench.md, Which array):")
+    print_text("The board does not state how its chips are mounted (docs/how_to/bench.md, Which array):")
     for array in candidates:
         print_text(f"  {array.name}: {mounting_words(array)}")
     while True:

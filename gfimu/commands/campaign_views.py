@@ -111,6 +111,9 @@ class CampaignTable(PlottedResult):
         }
 
 
+_PICTURE = OutputFile("a picture", (".png", ".svg", ".html"), dict.fromkeys((".png", ".svg", ".html"), ("matplotlib",)))
+
+
 def group_columns(groups: Sequence[Group]) -> dict[str, NDArray[Any]]:
     """Return groups as columns: the factors' values, then result, cases, failed, low, median_or_share, high."""
     factors = list(groups[0].values) if groups else []
@@ -193,7 +196,7 @@ def campaign_table(folder: str | Path, *, by: Sequence[str] = (), csv: str | Pat
     return found
 
 
-@writes(reads=("folder",), out=OutputFile("a picture", (".png", ".svg", ".html")))
+@writes(reads=("folder",), out=_PICTURE)
 def campaign_plot(folder: str | Path, *, out: str | Path, result: Sequence[str] = ()) -> list[str]:
     """Draw results against each factor, and which factors cause their variance; return the names of what is drawn.
 

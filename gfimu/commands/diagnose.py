@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,6 +12,7 @@ import numpy as np
 
 from gfimu.errors import InputError
 from gfimu.files.outputs import OutputFolder, same_file, writes
+from gfimu.optional_packages import missing
 
 if TYPE_CHECKING:
     from gfimu.calibration.result import Calibration
@@ -22,7 +23,10 @@ if TYPE_CHECKING:
     from gfimu.joining import Joined
     from gfimu.recording import Recording
     from gfimu.recording.mapped import RecordingLike
+    from gfimu.visual.scene import Shape
     from gfimu.world_model import WorldModel
+    from sim.twin import Twin
+    from sim.world import World
 
 __all__ = ["FOLDER", "diagnose", "write_report"]
 
@@ -61,7 +65,8 @@ def diagnose(
         What the simulation believes: a twin, its name or file; or a simulation of one's own, as such or as
         ``rig.py:function`` (`gfimu.own_rig.load_model`).
     out : str or Path, optional
-        Folder for ``verdict.json``, ``twin.toml``, ``report.html`` and ``diagnosis.rrd``; made if it isn't there.
+        Folder for ``verdict.json``, ``twin.toml``, ``report.html`` and ``diagnosis.rrd``; made if it isn't there. A
+        file whose package is not installed is left out, with a warning before the work begins.
     held_out : as recordings
         Recordings kept for measuring the gain.
     calibration : Calibration, str or Path, optional
@@ -101,6 +106,10 @@ def diagnose(
     from gfimu.joining import displaced_reference
     from gfimu.recording.checks import examine
 
+    if out is not None:
+        from gfimu.diagnosis.report.folder import warn_of_omitted
+
+        warn_of_omitted()
     given = as_twin(twin)
     runs, unseen = (
         [as_source(run, given.array, column_map, map_set) for run in as_runs(group)] for group in (recordings, held_out)
@@ -172,7 +181,7 @@ def _explained(
 def write_report(diagnosis: Diagnosis, folder: str | Path) -> Path:
     """Write the folder of a diagnosis: verdict, extended twin, ``report.html`` and a rerun recording.
 
-    The rig of an extended `sim.twin.Twin` is drawn by its MuJoCo model.
+    The rig of an extended `sim.twin.Twin` is drawn by its MuJoCo model where mujoco and rerun-sdk are installed.
 
     Parameters
     ----------
@@ -184,7 +193,7 @@ def write_report(diagnosis: Diagnosis, folder: str | Path) -> Path:
     Returns
     -------
     Path
-        The report, for a browser.
+        The report, for a browser; ``verdict.json`` where the packages of the report are not installed.
 
     Raises
     ------
@@ -199,7 +208,8 @@ def write_report(diagnosis: Diagnosis, folder: str | Path) -> Path:
 
     twin = diagnosis.twin
     if not isinstance(twin, Twin):
-        return write_diagnosis(folder, diagnosis, twin_toml=twin.to_toml())["report"]
+        written = write_diagnosis(folder, diagnosis, twin_toml=twin.to_toml())
+        return written.get("report", written["verdict"])
     content = twin.to_dict()
     more = {}
     if twin.array_name not in list_models("arrays"):
@@ -207,21 +217,29 @@ def write_report(diagnosis: Diagnosis, folder: str | Path) -> Path:
         content["array"] = "array.toml"
         more["array.toml"] = twin.array.to_toml()
     rig = drawn_rig(diagnosis)
-    return write_diagnosis(folder, diagnosis, twin_toml=tomli_w.dumps(content), more=more, rig=rig)["report"]
+    written = write_diagnosis(folder, diagnosis, twin_toml=tomli_w.dumps(content), more=more, rig=rig)
+    return written.get("report", written["verdict"])
 
 
 def drawn_rig(diagnosis: Diagnosis) -> DrawnRig | None:
     """Return how the array of a diagnosis stood on its rig, for pictures; None for a simulation of one's own."""
     from gfimu.diagnosis.report.rig import DrawnRig
-    from sim.drawing import rig_drawing
     from sim.twin import Twin
 
     twin = diagnosis.twin
     if not isinstance(twin, Twin):
         return None
     world = twin.world(mounting=np.array(diagnosis.mounting_rotvec_rad))
-    turns = twin.drive_source != "gyro" and world.slide is None
-    return DrawnRig(world.mount_rotvec, world.cube_offset, rig_drawing(world) if turns else None, world.slide)
+    return DrawnRig(world.mount_rotvec, world.cube_offset, _shapes(twin, world), world.slide)
+
+
+def _shapes(twin: Twin, world: World) -> Mapping[str, Sequence[Shape]] | None:
+    """Return the shapes of the rig; None where it has none of its own, or is not drawn here."""
+    if twin.drive_source == "gyro" or world.slide is not None or missing("mujoco", "rerun"):
+        return None
+    from sim.drawing import rig_drawing
+
+    return rig_drawing(world)
 
 
 def _refuse_fitted(fitted: Sequence[object], held_out: Sequence[object]) -> None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, overload
 
 from gfimu.errors import InputError
 from gfimu.files.outputs import RECORDING, TRACE, OutputFolder, writes
+from gfimu.optional_packages import require
 
 if TYPE_CHECKING:
     from firmware_bridge.loop.board_process import BoardProcess
@@ -135,9 +136,7 @@ def run(
         If the emulator is not installed, an argument is wrong, the port can't be opened, or the output can't be written
         where it is asked for.
     """
-    from firmware_bridge.loop.board_process import require_emulator
-
-    require_emulator()
+    require("gfimu firmware run", "unicorn", "mujoco")
     if port is not None and out is not None:
         raise InputError("give either --port (pty or tcp:PORT) or --out (a recording)")
     ride = _ride(scenario, seed)
@@ -248,11 +247,10 @@ def trace(
     InputError
         If the emulator is not installed, or the output can't be written where it is asked for.
     """
+    require("gfimu firmware trace", "unicorn", "mujoco")
     from firmware_bridge.board.trace import write_rrd, write_vcd
     from firmware_bridge.frames.commands import sample_at
-    from firmware_bridge.loop.board_process import require_emulator
 
-    require_emulator()
     setup = sample_at(rate)
     with _board(_ride(scenario, seed), image, seed, pure_python=True, trace=True) as board:
         if skip:

@@ -222,7 +222,6 @@ def tolerance(
     from gfimu.geometry.observability import require_all_motions
     from gfimu.tolerances.budget import tolerance_budget
     from gfimu.tolerances.calibrated import calibrations_of, check_calibration
-    from gfimu.tolerances.picture import tolerance_picture
     from gfimu.tolerances.propagation import error_maps
     from gfimu.tolerances.tolerances import ChipErrors, Tolerances
     from gfimu.units import MILLI_G
@@ -274,6 +273,8 @@ def tolerance(
     result = ToleranceResult(drawn.name, words, motion.levelled > 0, tolerances, budgets, simulated, seed)
     if out is not None:
         errors = {name: found.errors for name, found in simulated.items()}
+        from gfimu.tolerances.picture import tolerance_picture
+
         tolerance_picture(out, budgets, errors, tolerances.shape, title=f"{drawn.name}: {words}")
     return result
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gfimu.files.outputs import RERUN, check_outputs, writes
+from gfimu.optional_packages import require
 
 if TYPE_CHECKING:
     from gfimu.diagnosis.verdict.verdict import Diagnosis
@@ -75,6 +76,7 @@ def view(
     GfimuError
         If this machine has no display, or the viewer fails; the message says what to do instead.
     """
+    require("gfimu view", "rerun")
     from gfimu.commands.known_axis import turning_axis
     from gfimu.commands.opened import as_array, as_source
     from gfimu.diagnosis.verdict.verdict import Diagnosis

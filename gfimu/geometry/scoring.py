@@ -266,7 +266,7 @@ def ranking_remark(scores: Sequence[Score]) -> str:
     """Return a sentence where κ and GDOP rank arrays differently, empty where they agree.
 
     The GF-IMU paper's appendix claims that all its alternatives have larger κ and GDOP than the cube; for κ that is
-    false of P1 and P2, whose κ is 1 (`docs/geometry.md`).
+    false of P1 and P2, whose κ is 1 (`docs/theory/geometry.md`).
 
     Parameters
     ----------

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gfimu.errors import GfimuError
 from gfimu.results.panels import Panel, Series
 
 if TYPE_CHECKING:
@@ -23,13 +22,7 @@ _STYLES = {"line": "-", "dashes": "--", "dots": ":"}
 
 
 def drawn(panels: Sequence[Panel], figure: Figure | SubFigure | None = None) -> Figure | SubFigure:
-    """Draw panels one below the other, in two columns where they are many.
-
-    Raises
-    ------
-    GfimuError
-        If matplotlib is not installed.
-    """
+    """Draw panels one below the other, in two columns where they are many."""
     across = 2 if len(panels) > 3 else 1
     down = -(-len(panels) // across)
     drawing = _new_figure(across, down) if figure is None else figure
@@ -43,11 +36,9 @@ def drawn(panels: Sequence[Panel], figure: Figure | SubFigure | None = None) -> 
 
 def _new_figure(across: int, down: int) -> Figure:
     """Return a figure of pyplot, so that a script can show it; a backend without windows keeps no hold of it."""
-    try:
-        import matplotlib as mpl
-        from matplotlib import pyplot as plt
-    except ImportError:
-        raise GfimuError("plot needs matplotlib, which is not installed: pip install matplotlib") from None
+    import matplotlib as mpl
+    from matplotlib import pyplot as plt
+
     figure = plt.figure(figsize=(_WIDTH * across, _HEIGHT * down + 0.4), layout="constrained")
     backend = mpl.get_backend().lower()
     if backend == "agg" or "inline" in backend:  # a notebook shows the cell's value; it would show this one twice

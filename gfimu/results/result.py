@@ -6,11 +6,11 @@ import json
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar, overload
 
 from numpy.typing import NDArray
 
-from gfimu.errors import GfimuError
+from gfimu.optional_packages import require
 from gfimu.results.html import result_html
 from gfimu.results.panels import Panel
 
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     import pyarrow as pa
     import rerun as rr
     from matplotlib.figure import Figure, SubFigure
+
+    _Canvas = TypeVar("_Canvas", Figure, SubFigure)
 
 __all__ = ["PlottedResult", "TableResult"]
 
@@ -41,13 +43,12 @@ class TableResult(ABC):
 
         Raises
         ------
-        GfimuError
+        MissingPackageError
             If pandas is not installed.
         """
-        try:
-            import pandas as pd
-        except ImportError:
-            raise _missing("pandas", "to_pandas") from None
+        require("to_pandas", "pandas")
+        import pandas as pd
+
         from gfimu.files.table import to_json
 
         table = pd.DataFrame(dict(self.to_columns()))
@@ -59,13 +60,12 @@ class TableResult(ABC):
 
         Raises
         ------
-        GfimuError
+        MissingPackageError
             If polars is not installed.
         """
-        try:
-            import polars as pl
-        except ImportError:
-            raise _missing("polars", "to_polars") from None
+        require("to_polars", "polars")
+        import polars as pl
+
         return pl.DataFrame(self.to_arrow())
 
     def to_arrow(self) -> pa.Table:
@@ -110,6 +110,12 @@ class PlottedResult(TableResult):
     def _panels(self) -> Sequence[Panel]:
         """Return what the picture shows."""
 
+    @overload
+    def plot(self, figure: None = None) -> Figure: ...
+
+    @overload
+    def plot(self, figure: _Canvas) -> _Canvas: ...
+
     def plot(self, figure: Figure | SubFigure | None = None) -> Figure | SubFigure:
         """Draw the result with matplotlib: units on the axes, bands and bars of ±2σ.
 
@@ -126,9 +132,10 @@ class PlottedResult(TableResult):
 
         Raises
         ------
-        GfimuError
+        MissingPackageError
             If matplotlib is not installed.
         """
+        require("plot", "matplotlib")
         from gfimu.results.figure import drawn
 
         return drawn(self._panels(), figure)
@@ -143,6 +150,7 @@ class PlottedResult(TableResult):
         entity : str
             Path of an entity above what is logged; the name of the class by default.
         """
+        require("a rerun recording", "rerun")
         from gfimu.results.stream import log_result
 
         log_result(stream, entity or type(self).__name__.lower(), self._heading(), self._facts(), self._panels())
@@ -160,10 +168,7 @@ class PlottedResult(TableResult):
         InputError
             If the name does not end in ``.rrd``, or its folder can't be written to.
         """
+        require("a rerun recording", "rerun")
         from gfimu.results.stream import write_result
 
         return write_result(path, type(self).__name__.lower(), self._heading(), self._facts(), self._panels())
-
-
-def _missing(library: str, method: str) -> GfimuError:
-    return GfimuError(f"{method} needs {library}, which is not installed: pip install 'gfimu[tables]'")

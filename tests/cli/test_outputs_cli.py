@@ -145,7 +145,7 @@ def test_every_path_is_declared_as_read_or_written(name):
 
 
 def test_the_docs_list_every_command_with_its_function(project_root):
-    page = (project_root / "docs" / "commands.md").read_text(encoding="utf-8")
+    page = (project_root / "docs" / "reference" / "commands.md").read_text(encoding="utf-8")
     rows = dict(re.findall(r"^\| `gfimu ([a-z]+(?: [a-z]+)?)[^|]*\| `gfimu\.([a-z._]+)\(", page, re.MULTILINE))
     assert rows == {name: PYTHON_NAME.get(name, name.replace(" ", ".")) for name in COMMANDS}
     for flag, argument in OTHER_WORDS.items():

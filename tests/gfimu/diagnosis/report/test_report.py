@@ -158,10 +158,10 @@ def test_the_folder_holds_all_files_or_none(tmp_path, monkeypatch):
     (tmp_path / "out" / "verdict.json").write_text("kept")
     written_report = []  # drawing it takes seconds, and the pages above are of it
     monkeypatch.setattr(
-        "gfimu.diagnosis.report.folder.write_report", lambda path, *_: written_report.append(path.write_text("report"))
+        "gfimu.diagnosis.report.page.write_report", lambda path, *_: written_report.append(path.write_text("report"))
     )
     with monkeypatch.context() as patch:
-        patch.setattr("gfimu.diagnosis.report.folder.write_picture", lambda *_, **__: 1 / 0)
+        patch.setattr("gfimu.diagnosis.report.picture.write_picture", lambda *_, **__: 1 / 0)
         with pytest.raises(ZeroDivisionError):
             write_diagnosis(tmp_path / "out", diagnosis)
     assert [file.name for file in (tmp_path / "out").iterdir()] == ["verdict.json"]
