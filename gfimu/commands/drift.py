@@ -8,8 +8,12 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from gfimu.commands.former_arguments import former_arguments
 from gfimu.errors import InputError
+from gfimu.results import Panel, PlottedResult, Series, TableResult, text_column
 
 if TYPE_CHECKING:
     from gfimu.geometry.array import AccelerometerArray
@@ -22,7 +26,7 @@ __all__ = ["Drift", "EquivalentErrors", "axis_drift", "drift", "drift_from_posit
 
 
 @dataclass(frozen=True)
-class Drift:
+class Drift(PlottedResult):
     """Position drift: the closed forms, and the Monte Carlo where one was asked for.
 
     Parameters
@@ -39,6 +43,36 @@ class Drift:
     sample: DriftSample | None
     seed: int
 
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """Return the columns of the budget, one row per cause."""
+        return self.budget.to_columns()
+
+    def _heading(self) -> str:
+        return self.budget._heading()
+
+    def _facts(self) -> list[tuple[str, str]]:
+        facts = self.budget._facts()
+        if self.sample is not None:
+            std = ", ".join(f"{one:.3g}" for one in self.sample.std[-1])
+            relative = 100.0 * self.sample.relative_sampling_error
+            facts.append((f"Monte Carlo, {self.sample.runs} runs", f"({std}) m, each ± {relative:.2g} %"))
+        return facts
+
+    def _notes(self) -> tuple[str, ...]:
+        return self.budget._notes()
+
+    def _panels(self) -> list[Panel]:
+        panels = self.budget._panels()
+        if self.sample is not None:
+            found = self.sample
+            series = tuple(
+                Series(axis, found.std[:, place], found.std[:, place] * found.relative_sampling_error, role=axis)
+                for place, axis in enumerate("xyz")
+            )
+            title = f"position error of {found.runs} simulated runs"
+            panels.append(Panel(title, "σ, m", series, found.t_s, "time, s", scale="zero"))
+        return panels
+
     def to_dict(self) -> dict[str, Any]:
         """Return the content of ``gfimu drift --json``."""
         result: dict[str, Any] = self.budget.to_dict()
@@ -54,7 +88,7 @@ class Drift:
 
 
 @dataclass(frozen=True)
-class EquivalentErrors:
+class EquivalentErrors(TableResult):
     """The constant errors that would explain a position error of a unit at rest.
 
     Parameters
@@ -84,6 +118,19 @@ class EquivalentErrors:
     rate_drift_deg_h: tuple[float, float, float]
     earth_rate_deg_h: float | None
     earth_share_m: float | None
+
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """Return one row per axis: position error, bias of p and rate drift that would explain it."""
+        return {
+            "axis": text_column("xyz"),
+            "position_m": np.array(self.position_m),
+            "left_m": np.array(self.left_m),
+            "bias_mg": np.array(self.bias_mg),
+            "rate_drift_deg_h": np.array(self.rate_drift_deg_h),
+        }
+
+    def _heading(self) -> str:
+        return f"Errors that would explain the position after {self.time_s:g} s"
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of ``gfimu drift --from-position --json``."""

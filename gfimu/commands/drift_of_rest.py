@@ -14,8 +14,7 @@ if TYPE_CHECKING:
     from gfimu.geometry.array import AccelerometerArray
     from gfimu.importing import ColumnMap
     from gfimu.position_drift.rest_windows import RestDrift
-    from gfimu.recording import Recording
-    from gfimu.recording.mapped import MappedFile
+    from gfimu.recording.mapped import RecordingLike
 
 __all__ = ["drift_of_rest"]
 
@@ -23,7 +22,7 @@ __all__ = ["drift_of_rest"]
 @former_arguments(time="duration")
 @writes(reads=("recording", "array", "calibration", "column_map"), picture=PICTURE)
 def drift_of_rest(
-    recording: Recording | str | Path | MappedFile,
+    recording: RecordingLike,
     array: AccelerometerArray | str | Path | None = None,
     *,
     duration: float = 30.0,
@@ -39,7 +38,7 @@ def drift_of_rest(
 
     Parameters
     ----------
-    recording : Recording, str or Path
+    recording : Recording, path, table, or times (n,) with readings (n, c)
         The recording, or its file, with a rest of ``lead + duration`` or more.
     array : AccelerometerArray, str or Path, optional
         The array, its name or file; the recording's own by default.
@@ -65,12 +64,12 @@ def drift_of_rest(
     GeometryError
         If the array can't see all six motions.
     """
-    from gfimu.commands.opened import as_calibrated_run, by_map, name_of
+    from gfimu.commands.opened import as_calibrated_run, as_source, name_of
     from gfimu.errors import naming
     from gfimu.position_drift.rest_windows import rest_drift
     from gfimu.recording.checks import examine
 
-    run, geometry = as_calibrated_run(by_map(recording, column_map, map_set), array, calibration)
+    run, geometry = as_calibrated_run(as_source(recording, array, column_map, map_set), array, calibration)
     examine(run, geometry, source=name_of(recording), force=force, whose="" if array is None else "the given")
     with naming(name_of(recording)):
         found = rest_drift(run, geometry, time=duration, lead=lead, gravity=gravity)

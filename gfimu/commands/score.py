@@ -6,9 +6,13 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from gfimu.commands.former_arguments import former_arguments
+from gfimu.results import Panel, PlottedResult, Series, result_html
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -19,10 +23,100 @@ if TYPE_CHECKING:
     from gfimu.known_axis.accuracy.bounds import AxisBounds
     from gfimu.known_axis.accuracy.predicted import PredictedRun
 
-__all__ = ["score"]
+__all__ = ["Scores", "score"]
+
+_COLUMNS = (
+    "array",
+    "channels",
+    "length_unit_m",
+    "condition_number",
+    "gdop",
+    "gdop_joint",
+    "null_space_rank",
+    "rate_bound_z_rad_s",
+    "sigma_rate_filter_rad_s",
+)
+"""Columns of the notebook's table."""
 
 _FASTEST = 1e6  # rad/s
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+
+
+class Scores(list["Score | AxisBounds"], PlottedResult):
+    """Scores of arrays side by side, in the order in which the arrays were given.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> scores = gfimu.score(["cube12", "corners8"])
+    >>> [f"{one.name} {one.gdop:.3f}" for one in scores.rigid]
+    ['cube12 1.061', 'corners8 0.750']
+    >>> scores.best.name
+    'corners8'
+    """
+
+    @property
+    def rigid(self) -> tuple[Score, ...]:
+        """Scores of the arrays that see all six motions."""
+        from gfimu.geometry.scoring import Score
+
+        return tuple(one for one in self if isinstance(one, Score))
+
+    @property
+    def about_axis(self) -> tuple[AxisBounds, ...]:
+        """Bounds of the arrays that were scored about an axis."""
+        from gfimu.known_axis.accuracy.bounds import AxisBounds
+
+        return tuple(one for one in self if isinstance(one, AxisBounds))
+
+    @property
+    def best(self) -> Score:
+        """The score of least GDOP among the arrays that see all six motions.
+
+        Raises
+        ------
+        InputError
+            If none does.
+        """
+        from gfimu.errors import InputError
+
+        if not self.rigid:
+            raise InputError("no array here sees all six motions, so none has a GDOP; see about_axis")
+        return min(self.rigid, key=lambda one: one.gdop)
+
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """Return one row per array, with the columns of its own table; NaN where an array has no such figure."""
+        rows = [one.to_columns() for one in self]
+        names = list(dict.fromkeys(name for row in rows for name in row))
+        return {name: np.concatenate([row.get(name, np.array([np.nan])) for row in rows]) for name in names}
+
+    def _heading(self) -> str:
+        return "Scores"
+
+    def _repr_html_(self) -> str:
+        columns = self.to_columns()
+        shown = _COLUMNS if self.rigid else tuple(columns)
+        return result_html(
+            self._heading(), [], {name: columns[name] for name in shown if name in columns}, self._notes()
+        )
+
+    def _notes(self) -> tuple[str, ...]:
+        from gfimu.geometry.scoring import ranking_remark
+
+        remark = ranking_remark(self.rigid)
+        return (remark,) if remark else ()
+
+    def _panels(self) -> list[Panel]:
+        from gfimu.geometry.scoring import score_panels
+
+        if self.rigid:
+            return score_panels(self.rigid)
+        names = tuple(one.array for one in self.about_axis)
+        kinds = (("one sample", "sample_std"), ("filter, settled", "filter_std"))
+        series = tuple(
+            Series(label, np.array([getattr(one, key) for one in self.about_axis], dtype=float)) for label, key in kinds
+        )
+        return [Panel("bounds on the rate about the axis", "σ of the rate, rad/s", series, names, scale="zero")]
 
 
 @former_arguments(duration_s="duration", sample_rate_hz="rate")
@@ -49,7 +143,7 @@ def score(
     jerk_rad2_s5: float = 1.0,
     fault_time_s: float = 1.0,
     per_channel: bool = False,
-) -> list[Score | AxisBounds]:
+) -> Scores:
     """Score the geometry of one or several arrays.
 
     An array that can't see all six motions is scored about its own axis, if its file names one.
@@ -124,7 +218,7 @@ def score(
     scores: Iterator[Score] = iter(())
     if seeing:
         scores = iter(score_arrays(seeing, length_unit_m=length_unit_m, omega_rad_s=omega, noise_m_s2=noise_m_s2))
-    found: list[Score | AxisBounds] = []
+    found = Scores()
     if len(seeing) < len(given_axes):  # the others don't wait for a compiler
         from gfimu.known_axis.accuracy.predicted import PredictedRun
 

@@ -9,9 +9,13 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from gfimu.commands.former_arguments import former_arguments
 from gfimu.errors import InputError
 from gfimu.files.outputs import PICTURE, writes
+from gfimu.results import Panel, PlottedResult, Series, text_column
 
 if TYPE_CHECKING:
     from gfimu.commands.tolerance_units import UnitErrors
@@ -31,7 +35,7 @@ _MOST_SAMPLES = 6000  # numerical: memory of the first-order maps, 1 GB with 24 
 
 
 @dataclass(frozen=True)
-class ToleranceResult:
+class ToleranceResult(PlottedResult):
     """Errors of an array by its tolerances, before and after calibration.
 
     Parameters
@@ -72,6 +76,46 @@ class ToleranceResult:
             }
             for calibration, found in self.units.items()
         }
+
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """Return one row per calibration, quantity and cause: the rms error it makes, its share of the variance."""
+        rows = [
+            (calibration, one, cause, size)
+            for calibration, budget in self.budgets.items()
+            for one in budget.quantities.values()
+            for cause, size in one.by_cause.items()
+        ]
+        return {
+            "calibration": text_column(calibration for calibration, _, _, _ in rows),
+            "quantity": text_column(one.name for _, one, _, _ in rows),
+            "cause": text_column(cause for _, _, cause, _ in rows),
+            "rms": np.array([size for _, _, _, size in rows], dtype=float),
+            "unit": text_column(one.unit for _, one, _, _ in rows),
+            "share": np.array([one.shares[cause] for _, one, cause, _ in rows], dtype=float),
+        }
+
+    def _heading(self) -> str:
+        return f"Tolerances of {self.array}"
+
+    def _facts(self) -> list[tuple[str, str]]:
+        facts = [("motion", self.motion)]
+        for calibration, budget in self.budgets.items():
+            sizes = "; ".join(f"{one.name} {one.rms:.3g} {one.unit}" for one in budget.quantities.values())
+            facts.append((f"errors, {calibration.replace('_', ' ')}", sizes))
+        return facts
+
+    def _panels(self) -> list[Panel]:
+        first = next(iter(self.budgets.values()))
+        panels = []
+        for name, quantity in first.quantities.items():
+            causes = tuple(dict.fromkeys(c for one in self.budgets.values() for c in one.quantities[name].by_cause))
+            series = tuple(
+                Series(key.replace("_", " "), np.array([one.quantities[name].by_cause.get(c, np.nan) for c in causes]))
+                for key, one in self.budgets.items()
+            )
+            title = f"error of {name.replace('_', ' ')}, by cause"
+            panels.append(Panel(title, f"rms, {quantity.unit}", series, causes, scale="log"))
+        return panels
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of ``gfimu tolerance --json``."""

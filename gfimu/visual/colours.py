@@ -19,6 +19,7 @@ __all__ = [
     "AFTER",
     "AFTER_ON_PAPER",
     "AXES",
+    "AXES_ON_PAPER",
     "BACKGROUND",
     "BEFORE",
     "BEFORE_ON_PAPER",
@@ -51,6 +52,7 @@ Colour = tuple[int, int, int] | tuple[int, int, int, int]
 """Red, green, blue and optionally opacity, each 0 to 255."""
 
 AXES: tuple[Colour, Colour, Colour] = ((213, 60, 60), (150, 225, 120), (70, 130, 250))
+AXES_ON_PAPER: tuple[Colour, Colour, Colour] = ((180, 30, 40), (96, 178, 60), (36, 72, 190))
 TRUTH: Colour = (165, 168, 174)
 ESTIMATE: Colour = (240, 140, 20)
 ESTIMATE_BAND: Colour = (196, 146, 88)
@@ -102,6 +104,7 @@ HEALTH: Mapping[str, Colour] = {
 SEPARATED: Mapping[str, Mapping[str, Colour]] = {
     "run": {"truth": TRUTH, "estimate": ESTIMATE, "tacho": TACHO, "command": COMMAND},
     "body axes": dict(zip("xyz", AXES, strict=True)),
+    "body axes on paper": dict(zip("xyz", AXES_ON_PAPER, strict=True)),
     "comparison": {"measured": MEASURED, "before": BEFORE, "after": AFTER},
     "report": {"noise": NOISE_ON_PAPER, "before": BEFORE_ON_PAPER, "after": AFTER_ON_PAPER, "ink": INK},
 }
