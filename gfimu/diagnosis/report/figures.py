@@ -55,9 +55,10 @@ __all__ = [
 _BEFORE, _AFTER = css(BEFORE_ON_PAPER), css(AFTER_ON_PAPER)
 _NOISE, _INK, _PALE = css(NOISE_ON_PAPER), css(INK), css(PALE)
 _STRONGEST = 4  # channels drawn in colour
+_MANY = 24  # channels, of more of which pictures are coarser so that the page stays small
 _MOST_POINTS = 4000
 _MOST_FREQUENCIES = 1200
-_DPI = 110
+_DPI, _COARSE_DPI = 110, 55
 _SMOOTH_S = 0.15
 _GRID = "#ededed"  # of `array_figure`
 _STYLE = {
@@ -119,7 +120,7 @@ def channels_figure(run: RunView, size: ResidualSize, array: AccelerometerArray)
             axis.set_ylabel("m/s²")
         for axis in axes[-1]:
             axis.set_xlabel("time, s")
-        return _svg(figure)
+        return _svg(figure, _DPI if count <= _MANY else _COARSE_DPI)
 
 
 def rig_figure(
@@ -136,11 +137,14 @@ def dependence_figure(dependence: Dependence, array: AccelerometerArray) -> str:
         figure = Figure(figsize=(5.4, 2.3), layout="constrained")
         pair = figure.subplots(1, 2, sharey=True)
         strongest = list(np.argsort(-dependence.amplitude_before)[:_STRONGEST])
+        many = array.n_channels > _MANY
         for axis, mean, title in zip(pair, (dependence.before, dependence.after), ("before", "after"), strict=True):
             axis.axhline(0.0, color=_NOISE, linewidth=0.6)
             for channel in range(array.n_channels):
                 if channel not in strongest:
-                    axis.plot(dependence.centres[:, channel], mean[:, channel], color=_PALE, linewidth=0.8)
+                    axis.plot(
+                        dependence.centres[:, channel], mean[:, channel], color=_PALE, linewidth=0.8, rasterized=many
+                    )
             for channel in strongest:
                 colour, line = channel_style(array, channel)
                 axis.plot(
@@ -305,14 +309,14 @@ def _legend_above(axis: Axes) -> None:
         line.set_linewidth(2.0)
 
 
-def _svg(figure: Figure) -> str:
+def _svg(figure: Figure, dpi: int = _DPI) -> str:
     buffer = io.StringIO()
     if layout := figure.get_layout_engine():  # laid out here, as a figure that is saved with a layout is drawn twice
         FigureCanvasSVG(figure)
         figure.set_dpi(72)  # points per inch, in which SVG is laid out
         layout.execute(figure)
         figure.set_layout_engine(None)
-    figure.savefig(buffer, format="svg", dpi=_DPI, metadata={"Date": None})
+    figure.savefig(buffer, format="svg", dpi=dpi, metadata={"Date": None})
     text = buffer.getvalue()
     text = text[text.index("<svg") :]
     text = re.sub(r"<metadata>.*?</metadata>", "", text, count=1, flags=re.DOTALL)

@@ -87,7 +87,7 @@ def report_html(diagnosis: Diagnosis, rig: DrawnRig | None = None) -> str:
 def _content(diagnosis: Diagnosis, rig: DrawnRig) -> Mapping[str, Any]:
     array = diagnosis.twin.array
     bias_instability = float(diagnosis.noise.get("bias_instability_m_s2", 0.0))
-    seen = [run for run in diagnosis.runs if run.valid.any()]
+    seen = [run for run in diagnosis.runs if run.valid.any() and len(run.t) > 1]
     found = [residual_views(run, array.channels, bias_instability=bias_instability) for run in seen]
     label, tone = _VERDICTS[diagnosis.verdict]
     label += " in part" if diagnosis.in_part else ""

@@ -19,7 +19,7 @@ from gfimu.visual.plots import broken_at_gaps
 __all__ = ["dependence_plot", "residual_plot", "spectrum_plot"]
 
 _MOST_SAMPLES = 900_000  # of all channels together that are stored one by one; of more, the envelopes are
-_MOST_GROUPS = 180_000  # of all channels together
+_MOST_GROUPS = 300_000  # of all channels together
 _FINENESS = 8.0  # steps that values are rounded to, in a standard deviation of the noise
 _SMOOTH_S = 0.15
 _SHOWN_FIRST = 3  # channels
@@ -85,29 +85,27 @@ def dependence_plot(dependence: Dependence, array: AccelerometerArray, data: Pac
     """Return the plot of the mean residual of every channel over one quantity, before and after."""
     strength = np.nan_to_num(dependence.amplitude_before)
     step = max(_largest(dependence.before), _largest(dependence.after)) / 2**12
-    across = _largest(dependence.centres) / 2**14
-    shared = bool((dependence.centres == dependence.centres[:, :1]).all())
-    first = data.add(dependence.centres[:, 0], across, order=1) if shared else None
     return {
         "kind": "dependence",
         "x": {
             "name": dependence.symbol,
             "label": f"{dependence.symbol}, {dependence.unit}",
             "unit": dependence.unit,
+            "column": data.add(dependence.centres.T.ravel(), _largest(dependence.centres) / 2**14, order=1),
         },
         "unit": "m/s²",
         "label": "mean residual, m/s²",
         "strongest": [int(one) for one in np.argsort(-strength, kind="stable")[:_COLOURED]],
+        "bins": len(dependence.centres),  # of each channel, one channel after the other
+        "before": data.add(dependence.before.T.ravel(), step),
+        "after": data.add(dependence.after.T.ravel(), step),
         "channels": [
             {
                 "name": name,
-                "chip": int(array.chip_of_channel[column]),
-                "dash": int(np.count_nonzero(array.chip_of_channel[:column] == array.chip_of_channel[column])),
-                "x": first if first is not None else data.add(dependence.centres[:, column], across, order=1),
-                "before": data.add(dependence.before[:, column], step),
-                "after": data.add(dependence.after[:, column], step),
+                "chip": int(chip),
+                "dash": int(np.count_nonzero(array.chip_of_channel[:column] == chip)),
             }
-            for column, name in enumerate(array.channels)
+            for column, (name, chip) in enumerate(zip(array.channels, array.chip_of_channel, strict=True))
         ],
     }
 

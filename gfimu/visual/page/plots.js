@@ -1,8 +1,8 @@
 // Plots of a report that zoom, drawn with uPlot from the data in the page. Nothing is loaded from anywhere.
 //
-// The page has <script type="application/json" id="plots"> (what to draw), <script type="text/plain" id="plot-data">
-// (the columns, deflated, in base64: see packed.py) and an element <div data-plot="NAME"> for each plot. Once all are
-// drawn the page gets the class "live", with which the style sheet puts them in place of the still pictures.
+// The page has two elements with data, `plots` (JSON: what to draw) and `plot-data` (the columns, deflated, in base64:
+// see packed.py), and one with the attribute `data-plot` for each plot. When the plots are drawn the page gets the class
+// `live`, with which the style sheet puts them in place of the still pictures.
 
 "use strict";
 
@@ -210,7 +210,7 @@
       scales: { x: scale(0), y: scale(1) },
       padding: [6, 10, 0, 0],
       cursor: {
-        sync: { key, setSeries: focus, scales: ["x", null] },
+        sync: { key, setSeries: focus, scales: ["x", null], filters: { pub: (type) => type === "mousemove" || type === "mouseleave" } },
         drag: { x: true, y: true, uni: 30, setScale: false },
         points: { size: 6 },
         ...(focus ? { focus: { prox: 24 } } : {}),
@@ -458,7 +458,8 @@
       this.spec = spec;
       this.chosen = spec.strongest[0];
       const { channels } = spec;
-      this.read = (name, channel) => columns[channels[channel][name]];
+      const parts = { x: spec.x.column, before: spec.before, after: spec.after };
+      this.read = (name, channel) => columns[parts[name]].slice(channel * spec.bins, (channel + 1) * spec.bins);
       const every = channels.keys(), xs = [...every].map((channel) => this.read("x", channel));
       const [low, high] = extent(xs, 0, xs[0].length - 1);
       this.view = new View(Number.isFinite(low) ? low : 0, Number.isFinite(high) ? high : 1, () => this.fit());
