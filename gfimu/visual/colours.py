@@ -33,6 +33,7 @@ __all__ = [
     "MEASURED",
     "METAL",
     "NOISE_ON_PAPER",
+    "PAGE",
     "PALE",
     "SEPARATED",
     "SPIN_AXIS",
@@ -89,6 +90,47 @@ TONES: Mapping[str, Colour] = {
     "alarm": (176, 48, 48),
 }
 """Of the verdicts of a diagnosis, which are written beside them."""
+
+PAGE: Mapping[str, Mapping[str, Colour]] = {
+    "light": {
+        "ground": (244, 245, 247),
+        "card": (255, 255, 255),
+        "code": (238, 240, 243),
+        "pressed": (226, 232, 240),
+        "ink": INK,
+        "quiet": (93, 100, 112),
+        "line": (223, 227, 232),
+        "edge": (138, 143, 152),
+        "focus": (28, 95, 168),
+        "band": PALE,
+        "noise": NOISE_ON_PAPER,
+        "before": BEFORE_ON_PAPER,
+        "after": AFTER_ON_PAPER,
+        "spin-axis": SPIN_AXIS_ON_PAPER,
+        **TONES,
+    },
+    "dark": {
+        "ground": (17, 19, 23),
+        "card": BACKGROUND,
+        "code": (42, 46, 54),
+        "pressed": (54, 62, 74),
+        "ink": (228, 231, 236),
+        "quiet": (160, 167, 178),
+        "line": (54, 59, 68),
+        "edge": (112, 119, 131),
+        "focus": (120, 180, 250),
+        "band": (66, 72, 82),
+        "noise": MEASURED,
+        "before": BEFORE,
+        "after": AFTER,
+        "spin-axis": SPIN_AXIS,
+        "calm": (88, 196, 150),
+        "found": (110, 175, 245),
+        "open": (226, 166, 40),
+        "alarm": (245, 125, 118),
+    },
+}
+"""Of an HTML page by day and by night, by the names of its style sheet; a name means the same in both."""
 
 HEALTH: Mapping[str, Colour] = {
     "not watched": (104, 110, 120),
