@@ -37,7 +37,9 @@ if TYPE_CHECKING:
     from gfimu.calibration.array_calibration import update_array_calibration as update_array_calibration
     from gfimu.calibration.result import Calibration as Calibration
     from gfimu.calibration.result import load_calibration as load_calibration
+    from gfimu.commands import benchmark as benchmark
     from gfimu.commands import firmware as firmware
+    from gfimu.commands.benchmark import benchmark_list as benchmark_list
     from gfimu.commands.calibrate import calibrate as calibrate
     from gfimu.commands.campaign import campaign as campaign
     from gfimu.commands.campaign_views import campaign_plot as campaign_plot
@@ -123,6 +125,8 @@ _PUBLIC = {
     "Recording": "gfimu.recording",
     "SensorErrors": "gfimu.rate.sensing",
     "allan_deviation": "gfimu.sensor_noise",
+    "benchmark": "gfimu.commands",
+    "benchmark_list": "gfimu.commands.benchmark",
     "calibrate": "gfimu.commands.calibrate",
     "calibrate_array": "gfimu.calibration.array_calibration",
     "centripetal_agreement": "gfimu.motion.estimate_summary",
@@ -186,7 +190,7 @@ _PUBLIC = {
 }
 """Public names and the modules that hold them."""
 
-_MODULES = {"firmware"}
+_MODULES = {"benchmark", "firmware"}
 """Public names that are modules."""
 
 __all__ = ["__version__"]

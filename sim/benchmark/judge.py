@@ -10,6 +10,7 @@ import functools
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,8 @@ import numpy as np
 from gfimu.errors import GfimuError
 from sim.benchmark.answer import Answer, CauseAnswer
 from sim.benchmark.drawing import fresh_motion, nominal_twin
+from sim.benchmark.real import beyond_stated, held_out_recording, prediction_error, real_task
+from sim.benchmark.release import MEASURED, find_case
 from sim.benchmark.truth_file import Fixed, fixed_world
 from sim.benchmark.world import FreshMotion, Truth
 from sim.effects import Effect, make_effect
@@ -33,6 +36,8 @@ POINTS = {
     "error": 0.0,
     "wrong": -1.0,
     "false_alarm": -1.0,
+    "measured": math.nan,
+    "contradicted": math.nan,
 }
 """Points by outcome; of a set of k names at most 1/k, and of ``unknown`` twice as many where no name would be right.
 
@@ -75,7 +80,8 @@ class Judged:
         Names that are hidden, and the claims: a set is written ``a|b``.
     outcome : str
         ``alone`` (all hidden names and no other), ``set`` (in a set, or a tie of it), ``part`` (some of several),
-        ``unknown``, ``missed``, ``wrong``, ``error``; with nothing hidden ``quiet`` or ``false_alarm``.
+        ``unknown``, ``missed``, ``wrong``, ``error``; with nothing hidden ``quiet`` or ``false_alarm``; of measured
+        data ``measured``, or ``contradicted`` where a size is beyond what the makers state.
     points : float
         See `POINTS`.
     z : tuple of float
@@ -107,33 +113,55 @@ class Judged:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON form; NaN becomes null."""
-        numbers = {name: getattr(self, name) for name in ("removed", "expected_ratio", "processor_s")}
+        numbers = {name: getattr(self, name) for name in ("points", "removed", "expected_ratio", "processor_s")}
         return {
             "world": self.world,
             "method": self.method,
             "hidden": list(self.hidden),
             "said": list(self.said),
             "outcome": self.outcome,
-            "points": self.points,
             "z": [round(value, 3) for value in self.z],
             **{name: None if math.isnan(value) else float(f"{value:.5g}") for name, value in numbers.items()},
         }
 
 
-def judge(answers: Iterable[Answer]) -> list[Judged]:
+def judge(answers: Iterable[Answer], data: str | Path = "") -> list[Judged]:
     """Judge answers by the truth of the release.
 
     Parameters
     ----------
     answers : iterable of Answer
         Any worlds, in any order.
+    data : str or Path
+        Folder of the measured data, for answers to worlds of the set ``real``.
 
     Raises
     ------
     InputError
-        If a world is not of the release.
+        If a world is not of the release, or measured data are needed and not there.
     """
-    return [_judged(answer, fixed_world(answer.world)) for answer in answers]
+    return [
+        _judged_measured(answer, data)
+        if find_case(answer.world).generator == MEASURED
+        else _judged(answer, fixed_world(answer.world))
+        for answer in answers
+    ]
+
+
+def _judged_measured(answer: Answer, data: str | Path) -> Judged:
+    """Judge an answer for measured data: no truth, but what makers state, and the error on another recording."""
+    claims, recording = claims_of(answer), held_out_recording(answer.world, data)
+    twin = real_task(answer.world, data).twin
+    if answer.verdict == "error":
+        outcome, removed, ratio = "error", math.nan, math.nan
+    else:
+        outcome = "contradicted" if beyond_stated(answer.causes) else "measured"
+        before, after = (prediction_error(twin, effects, recording) for effects in ((), _effects(claims)))
+        removed = max(1.0 - (after / before) ** 2, -1.0)
+        ratio = math.nan if answer.expected_rms_m_s2 is None else answer.expected_rms_m_s2 / after
+    said = tuple("|".join(sorted(claim.names)) for claim in claims) or (answer.verdict,)
+    taken = math.nan if answer.processor_s is None else answer.processor_s
+    return Judged(answer.world, answer.method, (), said, outcome, math.nan, (), removed, ratio, taken)
 
 
 def _judged(answer: Answer, fixed: Fixed) -> Judged:

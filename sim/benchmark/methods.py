@@ -15,7 +15,8 @@ import msgspec
 
 from gfimu.errors import InputError
 from sim.benchmark.answer import Answer, answer_of
-from sim.benchmark.release import RELEASE, SETS, cases
+from sim.benchmark.real import real_task
+from sim.benchmark.release import MEASURED, RELEASE, cases, find_case
 from sim.benchmark.truth_file import task_of
 from sim.benchmark.world import Task
 from sim.sweep.dataset import Dataset
@@ -75,7 +76,9 @@ def _module(name: str) -> ModuleType:
         raise InputError(f"{name}: {error}; give a method as FILE.py:function") from None
 
 
-def benchmark_plan(reference: str, sets: Sequence[str], split: str, limit: int | None = None) -> PlanFile:
+def benchmark_plan(
+    reference: str, sets: Sequence[str], split: str, limit: int | None = None, data: str = ""
+) -> PlanFile:
     """Return the plan of a run: worlds and method.
 
     Parameters
@@ -88,22 +91,30 @@ def benchmark_plan(reference: str, sets: Sequence[str], split: str, limit: int |
         ``dev`` or ``test``.
     limit : int, optional
         Only so many worlds of each set; they stand in a fixed random order.
+    data : str
+        Folder of the measured data, which the set ``real`` needs.
 
     Raises
     ------
     InputError
-        If there is no such set or split.
+        If there is no such set or split, or measured data are needed and not there.
     """
-    worlds = [case.world for name in sets for case in cases(name, split)[:limit]]
-    if not worlds:
-        raise InputError(f"{', '.join(sets)}: no worlds; the release has {', '.join(SETS)}")
-    return PlanFile({"world": list(worlds), "method": [reference], "release": [RELEASE]}, kind="benchmark", batch=1)
+    chosen = [case for name in sets for case in cases(name, split)[:limit]]
+    if not chosen:
+        raise InputError(f"{', '.join(sets)}: has no worlds in the split {split}; choose another one")
+    for case in chosen:
+        if case.generator == MEASURED:
+            real_task(case.world, data)
+    factors: dict[str, Any] = {"world": [case.world for case in chosen], "method": [reference], "release": [RELEASE]}
+    return PlanFile(factors | ({"data": [data]} if data else {}), kind="benchmark", batch=1)
 
 
 def benchmark_work(case: Case) -> dict[str, Any]:
     """Run the method of a plan on a world; the whole answer is one column of JSON."""
     world, reference = str(case.values["world"]), str(case.values["method"])
-    answer = answer_task(load_method(reference), task_of(world))
+    measured = find_case(world).generator == MEASURED
+    task = real_task(world, str(case.values["data"])) if measured else task_of(world)
+    answer = answer_task(load_method(reference), task)
     return {
         "verdict": answer.verdict,
         "processor_s": answer.processor_s,

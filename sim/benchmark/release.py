@@ -15,10 +15,13 @@ import numpy as np
 
 from gfimu.errors import InputError, unknown_name
 
-__all__ = ["RELEASE", "SETS", "SPLITS", "Case", "SetInfo", "cases", "find_case"]
+__all__ = ["MEASURED", "RELEASE", "SETS", "SPLITS", "Case", "SetInfo", "cases", "find_case"]
 
 RELEASE = "gfimu-bench-1"
 """Name of the release; answers carry it."""
+
+MEASURED = "measured"
+"""Generator of the worlds that are not drawn but measured."""
 
 SPLITS = ("dev", "test")
 """Worlds to develop on, and worlds for the published table, of other seeds."""
@@ -179,7 +182,7 @@ def _unlisted(split: str) -> list[Case]:
 
 @functools.cache
 def cases(set_name: str, split: str) -> tuple[Case, ...]:
-    """Return the worlds of a set and split; those of ``real`` are found in a folder (`sim.benchmark.real`).
+    """Return the worlds of a set and split; the recordings of ``real`` are read from a folder (`sim.benchmark.real`).
 
     Raises
     ------
@@ -200,7 +203,7 @@ def cases(set_name: str, split: str) -> tuple[Case, ...]:
     elif set_name == "dcmotor":
         made = _made("dcmotor", split, ["dcmotor"], _drawn("dcmotor", split, _ON_A_MOTOR, {1: 9, 0: 3}))
     else:
-        made = []
+        made = [Case("real", split, number, MEASURED) for number in range(2 if split == "test" else 0)]
     return tuple(made)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.stats import binomtest, norm
@@ -19,6 +20,9 @@ COLUMNS = (
     *("false alarm %", "removed", "within 1σ, 2σ %", "processor s"),
 )
 """Heads of the table."""
+
+MEASURED_OUTCOMES = frozenset({"measured", "contradicted"})
+"""Outcomes of measured data, which have no truth to share in."""
 
 _LEVEL = 0.95
 _WORSE = -0.05  # of the removed share, from which an answer predicts worse than the given simulation
@@ -70,7 +74,8 @@ class Summary:
 
     def share(self, *outcomes: str, nothing: bool | None = False) -> Share:
         """Return the share of outcomes among worlds with something hidden, with nothing, or (None) all."""
-        chosen = [one for one in self.judged if nothing is None or _is_nothing(one) == nothing]
+        drawn = [one for one in self.judged if one.outcome not in MEASURED_OUTCOMES]
+        chosen = [one for one in drawn if nothing is None or _is_nothing(one) == nothing]
         return Share(sum(one.outcome in outcomes for one in chosen), len(chosen))
 
     @property
@@ -97,18 +102,39 @@ class Summary:
         values = [one.processor_s for one in self.judged if np.isfinite(one.processor_s)]
         return float(np.median(values)) if values else float("nan")
 
+    def to_dict(self) -> dict[str, Any]:
+        """Return the content for JSON: counts, so that anybody can make intervals of their own."""
+        mean, half = self.points
+        median, worse, measured = self.removed
+        return {
+            "set": self.set_name,
+            "method": self.method,
+            "worlds": len(self.judged),
+            "points": mean,
+            "points_half_interval": half,
+            "outcomes": dict(Counter(one.outcome for one in self.judged)),
+            "removed_median": median,
+            "predicts_worse": worse,
+            "removed_measured": measured,
+            "sizes": len([value for one in self.judged for value in one.z]),
+            "sizes_within_1_std": self.within(1.0).hits,
+            "sizes_within_2_std": self.within(2.0).hits,
+            "processor_s_median": self.processor_s,
+        }
+
     def row(self) -> tuple[str, ...]:
         """Return the cells of the table."""
         mean, half = self.points
         median, worse, measured = self.removed
         one, two = self.within(1.0), self.within(2.0)
         removal = f"{median:.3f}, worse {worse}/{measured}" if measured else "–"
-        sizes = f"{100 * one.hits / one.cases:.0f}, {100 * two.hits / two.cases:.0f} of {one.cases}"
+        cases = max(one.cases, 1)
+        sizes = f"{100 * one.hits / cases:.0f}, {100 * two.hits / cases:.0f} of {one.cases}"
         return (
             self.set_name,
             self.method,
             str(len(self.judged)),
-            f"{mean:+.2f} ± {half:.2f}",
+            "–" if np.isnan(mean) else f"{mean:+.2f} ± {half:.2f}",
             str(self.share("alone")),
             str(self.share("set", "part")),
             str(self.share("wrong")),
@@ -130,7 +156,7 @@ def summaries(judged: Iterable[Judged], *, together: bool = True) -> list[Summar
     groups: dict[tuple[str, str], list[Judged]] = defaultdict(list)
     for one in judged:
         groups[one.set_name, one.method].append(one)
-        if together:
+        if together and one.outcome not in MEASURED_OUTCOMES:
             groups["all", one.method].append(one)
     order = [*SETS, "all"]
     methods = list(dict.fromkeys(method for _, method in groups))

@@ -25,8 +25,8 @@ from gfimu.errors import InputError
 from gfimu.files.atomic_file import atomic_path
 from gfimu.recording import Recording
 from sim.benchmark.drawing import draw
-from sim.benchmark.release import RELEASE, SETS, SPLITS, Case, cases, find_case
-from sim.benchmark.ties import find_ties, free_distance
+from sim.benchmark.release import MEASURED, RELEASE, SETS, SPLITS, Case, cases, find_case
+from sim.benchmark.ties import free_distance_and_ties
 from sim.benchmark.world import Task, Truth
 
 __all__ = ["TRUTH_FILE", "Fixed", "digest_of", "fixed_world", "release_hash", "task_of", "truths"]
@@ -108,15 +108,14 @@ def make(case: Case) -> dict[str, Any]:
     """Draw a case until what is hidden can be seen, and return its line."""
     for attempt in range(_MOST_DRAWS):
         world = draw(case, attempt)
+        truth = world.truth
         if case.set_name == "unlisted":
-            truth, seen = world.truth, world.truth.distance
+            seen = truth.distance
         else:
-            seen = free_distance(world, case.tacho_noise) if case.effects else math.nan
-            truth = replace(world.truth, distance_drive_unknown=seen)
+            seen, ties = free_distance_and_ties(world, case.tacho_noise, LEAST_VISIBLE)
+            truth = replace(truth, distance_drive_unknown=seen, ties=ties)
         if not seen < LEAST_VISIBLE:  # NaN: without a noise-free form
             break
-    if case.effects and case.set_name != "unlisted":
-        truth = replace(truth, ties=find_ties(world, case.tacho_noise))
     return {
         "world": case.world,
         "attempt": attempt,
@@ -156,7 +155,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, default=TRUTH_FILE)
     parser.add_argument("--workers", type=int, default=1)
     options = parser.parse_args(arguments)
-    listed = [case for split in SPLITS for name in SETS for case in cases(name, split)]
+    listed = [case for split in reversed(SPLITS) for name in SETS for case in cases(name, split)]
+    listed = [case for case in listed if case.generator != MEASURED]
     with ProcessPoolExecutor(options.workers) as pool:
         lines = []
         for entry in pool.map(make, listed):

@@ -9,16 +9,15 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from contextlib import redirect_stdout
-from io import StringIO
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.errors import InputError, unknown_name
-from sim.benchmark.library import Block, Candidate, KnownDrive, LinearLibrary
-from sim.effects import Effect, make_effect
+from gfimu.errors import unknown_name
+from sim.benchmark.baselines.sysid import identify
+from sim.benchmark.library import Block, Candidate, LinearLibrary
+from sim.effects import make_effect
 from sim.study.cases import Case
 from sim.study.outcome import HiddenWorld, draw_world, processor_time
 
@@ -27,7 +26,6 @@ __all__ = ["METHODS", "run_baseline"]
 _MOST_CAUSES = 5
 _SIGNIFICANT = 4.0
 _SEEN = 1e-6  # standard deviation as a share of the prior below which a coordinate was left out, not measured
-_HALF_WIDTH = 1.96  # of a 95 % interval, in standard deviations
 
 
 def run_baseline(method: str, case: Case, source: str = "") -> dict[str, Any]:
@@ -127,42 +125,11 @@ def _told_sysid(world: HiddenWorld) -> list[dict[str, Any]]:
     places = np.flatnonzero(effect.size_values(array))
     if not len(places):
         return []
-    estimate, std = _identify(world, effect, places)
+    estimate, std = identify(world, effect, places)
     keys = [effect.sizes(array)[place].key for place in places]
     z = (estimate - effect.size_values(array)[places]) / std
     scores = {key: round(float(value), 3) for key, value in zip(keys, z, strict=True)}
     return [{"effect": name, "place": "", "probability": 1.0, "log_odds": None, "rivals": [], "z": scores}]
-
-
-def _identify(
-    world: HiddenWorld, effect: Effect, places: NDArray[np.intp]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Fit some sizes of an effect with ``mujoco.sysid``; returns estimates and standard deviations."""
-    from mujoco import sysid
-
-    if not hasattr(sysid, "optimize"):
-        raise InputError('MuJoCo\'s system identification is not installed: pip install "mujoco[sysid]"')
-    array, shape = world.twin.array, effect.shape_values()
-    measured, drive = world.recording.for_array(array), KnownDrive(world.recording, world.twin)
-    priors = np.array([size.prior_std for size in effect.sizes(array)])
-
-    def residual(x: NDArray[np.float64], parameters: Any) -> tuple[list[NDArray[np.float64]], None, None]:
-        columns = []
-        for free in np.reshape(x, (len(places), -1)).T:
-            values = np.zeros(len(priors))
-            values[places] = free * priors[places]
-            left = drive.readings(type(effect).from_sizes(array, values, shape)) - measured
-            columns.append(sysid.normalize_residual(left, measured).ravel())
-        return [np.array(columns).T if np.ndim(x) > 1 else columns[0]], None, None
-
-    sizes = sysid.ParameterDict()
-    for place in places:  # in units of the prior, for the optimiser's sake
-        sizes.add(sysid.Parameter(str(place), 0.0, -1e3, 1e3))
-    with redirect_stdout(StringIO()):  # its optimiser prints each iteration
-        fitted, result = sysid.optimize(sizes, residual, verbose=False, max_iters=20)
-    final, *_ = residual(fitted.as_vector(), fitted)
-    _, half_widths = sysid.calculate_intervals(final, np.asarray(result.jac))
-    return fitted.as_vector() * priors[places], np.asarray(half_widths) / _HALF_WIDTH * priors[places]
 
 
 METHODS = {"greedy BIC": _greedy_bic, "everything at once": _everything, "mujoco.sysid, told": _told_sysid}
