@@ -40,7 +40,9 @@ if TYPE_CHECKING:
     from gfimu.calibration.result import Calibration as Calibration
     from gfimu.calibration.result import load_calibration as load_calibration
     from gfimu.certification.certificate import Certificate as Certificate
+    from gfimu.commands import benchmark as benchmark
     from gfimu.commands import firmware as firmware
+    from gfimu.commands.benchmark import benchmark_list as benchmark_list
     from gfimu.commands.calibrate import calibrate as calibrate
     from gfimu.commands.campaign import CampaignResult as CampaignResult
     from gfimu.commands.campaign import campaign as campaign
@@ -195,6 +197,8 @@ _PUBLIC = {
     "Recording": "gfimu.recording",
     "SensorErrors": "gfimu.rate.sensing",
     "allan_deviation": "gfimu.sensor_noise",
+    "benchmark": "gfimu.commands",
+    "benchmark_list": "gfimu.commands.benchmark",
     "calibrate": "gfimu.commands.calibrate",
     "calibrate_array": "gfimu.calibration.array_calibration",
     "centripetal_agreement": "gfimu.motion.estimate_summary",
@@ -260,7 +264,7 @@ _PUBLIC = {
 }
 """Public names and the modules that hold them."""
 
-_MODULES = {"firmware"}
+_MODULES = {"benchmark", "firmware"}
 """Public names that are modules."""
 
 __all__ = ["__version__"]

@@ -105,6 +105,11 @@ JOBS: dict[str, tuple[Entry, ...]] = {
             "diagnose",
         ),
         Entry("design", "Propose the table profile, or the mounting, that best separates effects.", "design"),
+        Entry(
+            "benchmark",
+            "Measure how well a method names what a simulation gets wrong: fixed worlds, a judge, baselines.",
+            "benchmark",
+        ),
     ),
     "Design and simulate": (
         Entry(

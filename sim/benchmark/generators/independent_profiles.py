@@ -6,10 +6,11 @@ The table follows them exactly, unless what is hidden is in its drive or its mou
 from functools import partial
 
 import numpy as np
-from independent_table import LEAD, Rig, TableRun, differenced_readings, drive_table
-from independent_world import hide as hide_in
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d
+
+from sim.benchmark.generators.independent_table import LEAD, Rig, TableRun, differenced_readings, drive_table
+from sim.benchmark.generators.independent_world import hide as hide_in
 
 _STEP = 1e-3  # s
 

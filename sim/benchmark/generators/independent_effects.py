@@ -5,9 +5,10 @@ table, the readings, the reference or the samples stands in the functions furthe
 """
 
 import numpy as np
-from independent_table import Rig
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import lfilter
+
+from sim.benchmark.generators.independent_table import Rig
 
 G = 9.80665
 MG = G / 1000
@@ -192,7 +193,7 @@ def _chip_vectors(parameters, unit):
 
 def rig_with(hidden):
     """The rig that has the mechanical effects in it."""
-    get = lambda name: hidden.get(name, {})  # noqa: E731
+    get = lambda name: hidden.get(name, {})
     tilt, mount, off = get("table_tilt"), get("mount_tilt"), get("eccentricity")
     nod, ripple, mode = get("axis_wobble"), get("cogging"), get("resonance")
     return Rig(
@@ -227,7 +228,7 @@ def cube_angle(run, hidden):
 
 def analogue(readings, t, angle, rate, temperature, hidden):
     """What the chips make of specific force (n, 12) on the fine time base, before it becomes numbers."""
-    get = lambda name: hidden.get(name, {})  # noqa: E731
+    get = lambda name: hidden.get(name, {})
     out = readings + _vector(get("quadratic"), "_s2_m") * readings**2
     for pair, ratio in get("cross_axis").items():
         to, _, source = pair.partition("_from_")
@@ -278,7 +279,7 @@ def _play(signal, half_width):
 
 def reference_reading(t, angle_at, rate_at, hidden):
     """What the tachometer says at times t, without noise."""
-    get = lambda name, key: hidden.get(name, {}).get(key, 0.0)  # noqa: E731
+    get = lambda name, key: hidden.get(name, {}).get(key, 0.0)
     late = t - get("tacho_latency", "delay_s")
     reading = rate_at(late) * (1.0 + get("tacho_scale", "ratio"))
     if "tacho_ripple" in hidden:
@@ -289,7 +290,7 @@ def reference_reading(t, angle_at, rate_at, hidden):
 
 def digital(samples, t, hidden, rng):
     """What happens to analogue samples (n, 12) on their way to the file; rows to drop come second."""
-    get = lambda name: hidden.get(name, {})  # noqa: E731
+    get = lambda name: hidden.get(name, {})
     limit = get("saturation").get("limit_m_s2", 16 * G)
     step = get("coarse_resolution").get("step_m_s2", LSB)
     out = step * np.round(np.clip(samples, -limit, limit) / step) + 0.0  # no minus zero

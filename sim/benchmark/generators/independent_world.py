@@ -3,7 +3,7 @@
 `hide` draws a table run (MuJoCo, stepped, real drive), puts effects into it, measures it with chips and a tachometer
 of its own, and returns the file's columns apart from the truth. As a program it writes both:
 
-    python tests/independent_world.py --seed 3 --size 300 --out DIR table_tilt
+    python -m sim.benchmark.generators.independent_world --seed 3 --size 300 --out DIR table_tilt
 """
 
 import argparse
@@ -13,7 +13,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from independent_effects import (
+from scipy.fft import irfft, next_fast_len, rfft
+from scipy.interpolate import CubicSpline
+
+from sim.benchmark.generators.independent_effects import (
     CHANNELS,
     DRAWS,
     EXOTICS,
@@ -28,9 +31,7 @@ from independent_effects import (
     rig_with,
     scaled,
 )
-from independent_table import Rig, differenced_readings, drive_table, random_command
-from scipy.fft import irfft, next_fast_len, rfft
-from scipy.interpolate import CubicSpline
+from sim.benchmark.generators.independent_table import Rig, differenced_readings, drive_table, random_command
 
 
 @dataclass(frozen=True)
@@ -88,7 +89,7 @@ def hide(seed, effects=(), size=300.0, *, draw_command=random_command, drive=dri
     command = draw_command(rng, plan.duration, top)
     plain = drive(command, Rig(), plan.duration, plan.step_s)
     plan = Setting(**{**setting, "top": float(np.abs(plain.readings).max())})
-    temperature = _draw_temperature(rng, plan.duration)
+    temperature = draw_temperature(rng, plan.duration)
     hidden = {}
     for name in effects:
         unit = (DRAWS | EXOTICS)[name](rng, plan)
@@ -98,7 +99,7 @@ def hide(seed, effects=(), size=300.0, *, draw_command=random_command, drive=dri
     rig = rig_with(hidden)
     run = drive(command, rig, plan.duration, plan.step_s) if _differs(rig) else plain
     t, readings, tacho = noise_free(run, plan, temperature, hidden, rig, run.readings)
-    columns = _measured(rng, plan, t, readings, tacho, temperature, hidden)
+    columns = measured(rng, plan, t, readings, tacho, temperature, hidden)
     least = min((_reached(plain, plan, temperature, name, hidden[name], size) for name in hidden), default=np.inf)
     return HiddenRun(columns, tuple(hidden.items()), least)
 
@@ -185,7 +186,7 @@ def noise_free(run, plan, temperature, hidden, rig, sensed=None):
     return t, np.hstack(chips), tacho
 
 
-def _measured(rng, plan, t, readings, tacho, temperature, hidden):
+def measured(rng, plan, t, readings, tacho, temperature, hidden):
     """Columns of the file: noise, 1/f noise, counts, wiring, lost rows."""
     white = WHITE * np.sqrt(max(plan.sample_rate, 100.0) / 100.0) * hidden.get("noise", {}).get("factor", 1.0)
     samples = readings + white * rng.standard_normal(readings.shape)
@@ -212,7 +213,7 @@ def pink_noise(rng, n, columns):
     return (noise / noise.std(axis=0))[-n:]
 
 
-def _draw_temperature(rng, duration):
+def draw_temperature(rng, duration):
     rise, settling = rng.uniform(1.0, 4.0), rng.uniform(0.2, 0.8) * duration
     swing, period = rng.uniform(0.1, 0.6), rng.uniform(0.3, 1.2) * duration
     return lambda t: 25.0 + rise * (1 - np.exp(-np.maximum(t, 0.0) / settling)) + swing * np.sin(2 * np.pi * t / period)

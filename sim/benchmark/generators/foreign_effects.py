@@ -10,12 +10,23 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from independent_effects import CHANNELS, MG, WHITE, G, _phase, _sign, _some_channels, _turning_channel, _vector
-from independent_table import Rig, read_positions
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d, uniform_filter1d
 from scipy.signal import bilinear, lfilter
 from scipy.spatial.transform import Rotation
+
+from sim.benchmark.generators.independent_effects import (
+    CHANNELS,
+    MG,
+    WHITE,
+    G,
+    _phase,
+    _sign,
+    _some_channels,
+    _turning_channel,
+    _vector,
+)
+from sim.benchmark.generators.independent_table import Rig, read_positions
 
 STAGES = ("drive", "places", "analogue", "reference", "times", "sampled", "noise")
 PLACES = ("reference", "clock", "motion", "bench", "cube", "chip", "supply", "host", "nothing")
