@@ -11,10 +11,25 @@ import ast
 import unicodedata
 from collections.abc import Iterable, Mapping
 
-__all__ = ["DOT", "VECTORS", "to_latex", "to_python", "vectors_of"]
+__all__ = ["BY_CHANCE", "DOT", "TOLERANCE", "VECTORS", "to_latex", "to_python", "vectors_of"]
 
 VECTORS = frozenset("aFruxz") | {"ρ"}
 """Sensing axis, specific force, place from the axis, up, the room's x, the table's axis, place from the centre."""
+
+TOLERANCE = {
+    # to first order in a small rotation of some 10 mrad
+    **dict.fromkeys(("misalignment", "mount_tilt", "table_tilt", "axis_wobble", "mount_turn"), 1e-2),
+    "gyro_misalignment": 1e-2,
+    # the derivatives of the test or of the simulation are finite differences, and modes are held on a grid of time
+    **dict.fromkeys(("cogging", "resonance", "bench_sway", "centrifugal_flex", "lean_by_acceleration"), 5e-3),
+    **dict.fromkeys(("lean_by_rate", "lean_by_rate_squared", "lean_by_turns", "proof_mass"), 1e-3),
+    **dict.fromkeys(("sensor_lag", "chip_lag", "tacho_lag", "lagged_temperature", "temperature_gradient"), 1e-3),
+    **dict.fromkeys(("gyro_scale", "gyro_latency"), 1e-3),
+}
+"""Largest difference between a formula and the simulation over the largest change that the effect makes; else 1e-6."""
+
+BY_CHANCE = {"noise": 0.02, "bias_random_walk": 0.15, "dropped_frames": 0.25}
+"""Of formulas that hold on average: relative error in a simulated recording of the test."""
 
 DOT, TWO_DOTS = "\u0307", "\u0308"
 

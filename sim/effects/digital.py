@@ -114,10 +114,10 @@ class Saturation(_Discrete):
 
     Notes
     -----
-    :formula: y = clip(f, −L, L)
-    :symbols: L = limit_m_s2
+    :formula: y = clip(f, L₁, L₂)
+    :symbols: L₁ = {channel}_lower_m_s2; L₂ = {channel}_upper_m_s2
     :size: No prior: the level is read from the samples, which stand still at it.
-    :example: limit_m_s2 = 8.0
+    :example: a11_upper_m_s2 = 4.0, a11_lower_m_s2 = -4.0
     :experiment: Repeat the run at lower rates, where no reading reaches the level: it must agree with the simulation.
     :recordings: MIMU4444: the gyros clip in 3 % of the samples of the shaken part, the accelerometers need not.
     """
