@@ -25,6 +25,7 @@ from gfimu.errors import InputError
 from gfimu.importing.oddities import oddities
 from gfimu.recording import Recording
 from gfimu.recording.checks import check_recording
+from gfimu.results import Panel, PlottedResult, Series, text_column
 from gfimu.world_model import WorldModel, is_linear, reads_place
 
 __all__ = ["EffectView", "RunCheck", "UsefulRun", "check_runs", "turns_one_way"]
@@ -83,7 +84,7 @@ class EffectView:
 
 
 @dataclass(frozen=True)
-class RunCheck:
+class RunCheck(PlottedResult):
     """What recordings can show.
 
     Parameters
@@ -102,6 +103,28 @@ class RunCheck:
     findings: tuple[str, ...]
     effects: tuple[EffectView, ...]
     advice: tuple[str, ...]
+
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """Return one row per effect: how well the motion shows it, and what it is confounded with."""
+        return {
+            "effect": text_column(one.name for one in self.effects),
+            "detectability": np.array([one.detectability for one in self.effects], dtype=float),
+            "seen": np.array([one.seen for one in self.effects], dtype=bool),
+            "confused_with": text_column(", ".join(one.confused_with) for one in self.effects),
+        }
+
+    def _heading(self) -> str:
+        return "What the recordings can show"
+
+    def _notes(self) -> tuple[str, ...]:
+        return (*self.findings, *self.advice)
+
+    def _panels(self) -> list[Panel]:
+        names = tuple(one.name for one in self.effects)
+        sizes = Series("", np.array([one.detectability for one in self.effects], dtype=float))
+        return [
+            Panel("detectability of effects of usual size", "d′, standard deviations", (sizes,), names, scale="zero")
+        ]
 
     def to_dict(self) -> dict[str, Any]:
         """Return the check as JSON holds it."""
