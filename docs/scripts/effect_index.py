@@ -16,7 +16,7 @@ from sim.effects.description import Description, describe
 
 __all__ = ["index_page"]
 
-_LONGEST = 48  # characters of a formula in the table
+_LONGEST = 28  # characters of a formula in the table
 _ANY = Policy().seen
 
 

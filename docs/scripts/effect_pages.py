@@ -35,6 +35,7 @@ EXPERIMENTS = {
 """Words for the experiments of `effect_rivals`."""
 
 _UNITS = {RATIO: "1", NUMBER: "number", NAME: "name"}
+SLOWEST_LINE = 0.3  # Hz: what is slower is the course of the run
 LEAST, MOST = 0.1, 1000  # nats: what is less, or more, is printed so
 _ANY = Policy().seen
 
@@ -53,7 +54,7 @@ def page(effect: type[Effect], numbers: Mapping[str, Any]) -> str:
         "## Signature",
         _signature(effect, text, numbers["signature"]),
         "## Rivals",
-        _rivals(numbers),
+        _rivals(effect, numbers),
         "## How to separate it",
         _separation(text, numbers),
         "## In real data",
@@ -166,7 +167,7 @@ def _signature(effect: type[Effect], text: Description, found: Mapping[str, Any]
             f"A function of the {found['against'].rpartition(',')[0]} explains "
             f"{100 * found['share']:.0f} % of its variance."
         )
-    if found["line_hz"] is not None:
+    if found["line_hz"] is not None and found["line_hz"] > SLOWEST_LINE:
         sentences.append(
             f"Strongest line of {found['drawn'][0]}: {found['line']:g} {found['unit']} at {found['line_hz']:g} Hz."
         )
@@ -178,7 +179,7 @@ def _signature(effect: type[Effect], text: Description, found: Mapping[str, Any]
     return f"![{alt}](figures/{effect.name}.png)\n\n" + " ".join(sentences)
 
 
-def _rivals(numbers: Mapping[str, Any]) -> str:
+def _rivals(effect: type[Effect], numbers: Mapping[str, Any]) -> str:
     motions = numbers["motions"]
     if not motions:
         return (
@@ -200,6 +201,9 @@ def _rivals(numbers: Mapping[str, Any]) -> str:
             f"Computed for the example below, linear in the sizes of the rivals; those that would need a size beyond "
             f"their limit are left out. A diagnosis looks for a fault of the samples before any fit. {notes}"
         )
+    if effect.contained_in:
+        wider = _and([link(one) for one in sorted(effect.contained_in)])
+        notes += f" Whatever it does, {wider} can do too: no motion separates the two, and the narrower one is named."
     return "\n".join(rows) + f"\n\n{notes}"
 
 
@@ -232,22 +236,20 @@ def _separation(text: Description, numbers: Mapping[str, Any]) -> str:
                 "above confounds it."
             )
         else:
-            sentence = (
-                f"Computed: *{EXPERIMENTS[one['best']]}* separates it best. It stays inseparable from "
-                f"{_and([link(rival) for rival in one['remaining']])} there."
-            )
+            remaining = _and([link(rival) for rival in one["remaining"]])
+            none = all(max(values) < SEPARATED for values in one["nats"].values())
+            best = f"*{EXPERIMENTS[one['best']]}* separates it best, but not from {remaining}."
+            sentence = f"Computed: {f'none of these separates it from {remaining}.' if none else best}"
         parts += ["\n".join(rows), sentence]
     return "\n\n".join(parts)
 
 
 def _trial(effect: type[Effect], text: Description, found: Mapping[str, Any] | None) -> str:
     lines = [f"```\n{simulate_command(effect, text.example)}"]
-    twin = twin_of(effect.name)
+    twin = "free.toml" if effect.name.startswith("gyro_") else twin_of(effect.name)
     lines[0] += f"\ngfimu diagnose hidden.parquet --twin {twin} --out diagnosis\n```"
     if effect.name.startswith("gyro_"):
-        lines.append(
-            'The twin has to be that of a free body: a copy of `cube12_turntable` with `source = "gyro"` in `[drive]`.'
-        )
+        lines.append('`free.toml` is a copy of the twin `cube12_turntable` with `source = "gyro"` in `[drive]`.')
     lines.append(f'In a twin file it is a table `[[effect]]` with `name = "{effect.name}"` and the same parameters.')
     if isinstance(effect, type) and issubclass(effect, Unlisted):
         dependence = effect.dependence.name

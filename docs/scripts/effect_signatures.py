@@ -36,7 +36,7 @@ GREY, COLOURS = "#787878", ("#2b87c4", "#d55e00", "#009e73")
 
 WARMING, WARMING_TIME = 3.0, 15.0  # K, s
 BINS = 40
-MOST_BYTES = 60_000
+COLOURS_KEPT = 160  # of a picture: with fewer the lines take each other's colour
 HIDDEN = 0.1
 """Share of its own change by which a channel must differ from another one to be drawn beside it."""
 LONGEST_STROKES = 25.0  # s: the run of a linear axis is shorter, that of a table longer
@@ -281,4 +281,4 @@ def draw(found: Signature, path: Path) -> None:
         figure.savefig(memory, dpi=130)
         plt.close(figure)
     memory.seek(0)
-    Image.open(memory).quantize(48, method=Image.Quantize.FASTOCTREE).save(path, optimize=True)
+    Image.open(memory).quantize(COLOURS_KEPT, method=Image.Quantize.FASTOCTREE).save(path, optimize=True)
