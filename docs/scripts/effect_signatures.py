@@ -142,6 +142,8 @@ def signature(name: str, parameters: Mapping[str, Any]) -> Signature:
     else:
         order = _unlike(change)
         names, drawn, unit = tuple(twin.array.channels[place] for place in order), change[:, order], "m/s²"
+    if name == "dropped_frames":
+        unit = "1 = lost"
     rms = {one: float(np.sqrt(np.mean(change[:, k] ** 2))) for k, one in enumerate(twin.array.channels)}
     rms = {one: value for one, value in rms.items() if value > SMALLEST}
     if np.any(np.abs(reference_change) > SMALLEST):
