@@ -119,7 +119,7 @@ def _names(pattern: str, keys: list[str]) -> bool:
     plain = pattern.removeprefix("2π·")
     if "{" not in plain:
         return any(key in plain.split(", ") or key == plain for key in keys) or (plain == "channels" and plain in keys)
-    if plain == "{pair}":
+    if "{neighbour}" in plain:
         return "_from_" in keys[0]
     first, _, last = plain.partition("{")
     return any(key.startswith(first) and key.endswith(last.rpartition("}")[2]) for key in keys)

@@ -172,7 +172,7 @@ class CrossAxis(Effect):
     Notes
     -----
     :formula: y[i] = f[i] + c·f[j]
-    :symbols: c = {pair}
+    :symbols: c = {channel}_from_{neighbour}
     :size: Data sheets: ±1 % (ADXL345), ±2 % (MPU-9150). The prior is 1 %.
     :example: a11_from_a12 = 0.01, a22_from_a23 = -0.008
     :experiment: Six or more poses at rest give every pair of axes. A chip that is turned as a whole has pick-up of

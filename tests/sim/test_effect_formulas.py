@@ -121,6 +121,8 @@ FUNCTIONS = {"turn": turn, "backlash": backlash, "hold": hold} | {
 def keys_of(pattern, array):
     """Return the value of the parameters that a pattern of keys names."""
     chips = [chip.name for chip in array.chips]
+    if "{neighbour}" in pattern:
+        return pattern  # one of many pairs: the test of that effect takes it
     if "{channel}" in pattern:
         return [pattern.replace("{channel}", name) for name in array.channels]
     if "{chip}_{axis}" in pattern:
