@@ -41,10 +41,10 @@ def catalogue(kind: str) -> dict[str, str]:
     if kind not in KINDS:
         raise unknown_name("kind", kind, KINDS)
     if kind == "effects":
-        from sim.effects import CARRIAGE_EFFECTS, EFFECTS, FURTHER_EFFECTS, SIMULATED_EFFECTS, added_effects
+        from sim.effects import added_effects
+        from sim.effects.catalogue import every_effect
 
-        every = EFFECTS | FURTHER_EFFECTS | CARRIAGE_EFFECTS | SIMULATED_EFFECTS | added_effects()
-        return {name: family.summary for name, family in every.items()}
+        return {name: family.summary for name, family in (every_effect() | added_effects()).items()}
     if kind == "formats":
         from gfimu.importing.readers import readers
         from gfimu.recording.formats import formats
@@ -76,10 +76,17 @@ def show(name: str) -> str:
     for kind in _FILES:
         if name in list_models(kind):
             return find_model(kind, name).read_text(encoding="utf-8")
-    effects = catalogue("effects")
-    if name in effects:
-        return f"{name}: {effects[name]}\n"
+    if name in catalogue("effects"):
+        return _shown_effect(name)
     raise unknown_name("name", name, [one for kind in (*_FILES, "effects") for one in catalogue(kind)])
+
+
+def _shown_effect(name: str) -> str:
+    """Return what an effect is, its formula, parameters, rivals, and the experiment that separates it."""
+    from sim.effects import added_effects
+    from sim.effects.catalogue import essence, every_effect
+
+    return essence((every_effect() | added_effects())[name])
 
 
 def _shown_file(name: str) -> str:
