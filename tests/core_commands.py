@@ -1,4 +1,4 @@
-"""Walk through gfimu's commands where only its core is installed: those that work, and those that are refused.
+"""Call gfimu's commands where only its core is installed: those that work, and those that are refused.
 
     python tests/core_commands.py            in an environment with the core alone (`tests/matrix.py light` makes one)
     python tests/core_commands.py --block    in any environment: imports of all optional packages fail
@@ -154,7 +154,7 @@ def wrong_calls(calls: Sequence[Call]) -> list[str]:
 
 
 def main() -> None:
-    """Walk in a folder that is made and removed."""
+    """Make the calls in a folder that is removed."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--block", action="store_true", help="let imports of all optional packages fail")
     options.add_argument("--part", choices=("all", "refused"), default="all", help="which calls")

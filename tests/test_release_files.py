@@ -79,7 +79,7 @@ def test_links_between_files_lead_somewhere(name, project_root):
 
 
 PLACEHOLDER = re.compile(
-    r"example\.(invalid|com|org)|TODO|FIXME|your-(org|name)|github\.com/(gfimu|user|owner)\b", re.IGNORECASE
+    r"example\.(invalid|com|org)|\bTODO\b|\bFIXME\b|your-(org|name)|github\.com/(gfimu|user|owner)\b", re.IGNORECASE
 )
 
 
