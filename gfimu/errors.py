@@ -20,6 +20,7 @@ __all__ = [
     "UnitError",
     "WriteError",
     "naming",
+    "nearest_name",
     "unknown_name",
 ]
 
@@ -94,6 +95,20 @@ def naming(source: str) -> Iterator[None]:
 def unknown_name(kind: str, name: str, valid: Iterable[str]) -> InputError:
     """Build the error for a name that is not in a list, with the list and the nearest name."""
     names = sorted(valid)
-    near = difflib.get_close_matches(name, names, 1, _ALIKE)
-    remedy = f"; did you mean {near[0]!r}?" if near else ""
+    near = nearest_name(name, names)
+    remedy = f"; did you mean {near!r}?" if near else ""
     return InputError(f"unknown {kind} {name!r}; valid: {', '.join(names)}{remedy}")
+
+
+def nearest_name(name: str, valid: Iterable[str], alike: float = _ALIKE) -> str | None:
+    """Return the name of a list that a wrong one was probably meant to be; None where none is near.
+
+    Case, and a dash for an underscore, count for nothing. Names are near from a ratio ``alike`` of `difflib` on.
+    """
+
+    def plainly(text: str) -> str:
+        return text.casefold().replace("-", "_")
+
+    meant = {plainly(one): one for one in valid}
+    near = difflib.get_close_matches(plainly(name), meant, 1, alike)
+    return meant[near[0]] if near else None

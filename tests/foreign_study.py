@@ -17,7 +17,6 @@ from pathlib import Path
 import foreign_world
 import msgspec
 import numpy as np
-from foreign_effects import FOREIGN
 
 from gfimu.diagnosis import diagnose
 from gfimu.diagnosis.data.prepared_runs import PreparedRuns
@@ -25,6 +24,7 @@ from gfimu.diagnosis.fit.learn import predicted_by_reference
 from gfimu.errors import GfimuError
 from gfimu.recording import Recording
 from gfimu.units import STANDARD_GRAVITY
+from sim.benchmark.generators.foreign_effects import FOREIGN
 from sim.study.outcome import draw_world, outcome_of, processor_time
 from sim.sweep.dataset import Dataset
 from sim.sweep.engine import run_campaign

@@ -240,6 +240,7 @@ COMMON = {
     "gfimu.files.atomic_file",
     "gfimu.short_repr",
     "gfimu.lazy_names",
+    "gfimu.results",
     "gfimu.optional_packages",
 }
 """Modules that every room may import; of `gfimu` itself the version."""
@@ -300,6 +301,7 @@ ROOMS = {
         "gfimu.sensor_noise",
         "gfimu.visual.colours",
     },
+    "gfimu.results": {"gfimu.files", "gfimu.visual.colours"},
     "gfimu.tolerances": {
         "gfimu.bounds.sample",
         "gfimu.calibration",

@@ -79,3 +79,34 @@ def test_no_shipped_file_calls_itself_the_printed_matrix(project_root):
     pages = [page for page in (project_root / "docs").rglob("*.md") if page.name not in {"papers.md", "geometry.md"}]
     for file in [*shipped, *pages, project_root / "README.md"]:
         assert not re.search(r"printed J\b|matrix printed", file.read_text(encoding="utf-8")), file.name
+
+
+CITED = re.compile(
+    r"(?:(GF-IMU|Persian) (?:calibration )?)?paper[^.;\n]{0,40}?\beqs?\.? (\d+)(?:[-–](\d+))?|(?<![\w-])eqs (28)[-–](29)"
+)
+
+
+def numbers(text):
+    """Numbers of equations that a text names, ranges filled in."""
+    return {
+        number
+        for first, last in re.findall(r"\beqs?\.? (\d+)(?:[-–](\d+))?", text)
+        for number in range(int(first), int(last or first) + 1)
+    }
+
+
+def test_equations_that_the_code_cites_are_in_the_theory(page, project_root):
+    """A number that a comment cites leads to a row of the papers, or to a derivation."""
+    theory = project_root / "docs" / "theory"
+    sections = {name: page.split(f"## {name} paper")[1].split("\n## ")[0] for name in ("GF-IMU", "Persian")}
+    derived = "".join((theory / name).read_text(encoding="utf-8") for name in ("geometry.md", "drift.md"))
+    known = {"GF-IMU": numbers(sections["GF-IMU"]) | numbers(derived), "Persian": numbers(sections["Persian"])}
+    cited = [
+        (match[1] or "GF-IMU", number, file.name)
+        for folder in ("gfimu", "sim", "firmware_bridge")
+        for file in (project_root / folder).rglob("*.py")
+        for match in CITED.finditer(file.read_text(encoding="utf-8"))
+        for number in numbers(match[0])
+    ]
+    assert {number for paper, number, _ in cited if paper == "GF-IMU"} >= {2, 22, 28, 29, 30}
+    assert not [where for where in cited if where[1] not in known[where[0]]]

@@ -6,32 +6,41 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from foreign_effects import FOREIGN, PLACES, STAGES, Motion, Places, acting, by_positions, noise_free
 from foreign_world import (
     CASES,
     SIZES,
     _campaign_motion,
     _held_by_bristles,
     _sensed,
-    _table_motion,
-    distance,
     hide,
     hide_in_campaign,
     in_turning_frame,
     new_recording,
-    sized,
 )
-from independent_effects import CHANNELS, DRAWS, EXOTICS
-from independent_world import Setting
 
 from gfimu.geometry.array import AccelerometerArray
 from sim import forward
+from sim.benchmark import generators
+from sim.benchmark.generators.foreign_effects import (
+    FOREIGN,
+    PLACES,
+    STAGES,
+    Motion,
+    Places,
+    acting,
+    by_positions,
+    noise_free,
+)
+from sim.benchmark.generators.foreign_world import distance, sized, table_motion
+from sim.benchmark.generators.independent_effects import CHANNELS, DRAWS, EXOTICS
+from sim.benchmark.generators.independent_world import Setting
 from sim.effects import EFFECTS
 from sim.motion import SplineSpin
 from sim.study.cases import Case
 from sim.study.outcome import draw_world
 from sim.twin import Twin
 
+FOLDER = Path(generators.__file__).parent
 PLAN = Setting(duration=4.0)
 T = np.arange(400) / 100
 MOVING = [name for name, effect in FOREIGN.items() if effect.stage == "places"]
@@ -42,7 +51,7 @@ GENERATORS = (hide, hide_in_campaign)
 
 @cache
 def table() -> Motion:
-    return _table_motion(1, 0, PLAN)[0]
+    return table_motion(1, 0, PLAN)[0]
 
 
 @cache
@@ -63,13 +72,13 @@ def test_no_name_is_one_of_a_library_and_kin_are():
     assert {name for effect in FOREIGN.values() for name in effect.kin} <= set(EFFECTS)
 
 
-def test_effects_share_no_code_with_the_project():
-    tree = ast.parse((Path(__file__).parent / "foreign_effects.py").read_text())
-    modules = {node.module.split(".")[0] for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
-    modules |= {
-        name.name.split(".")[0] for node in ast.walk(tree) if isinstance(node, ast.Import) for name in node.names
-    }
-    assert not modules & {"sim", "gfimu"}
+@pytest.mark.parametrize("file", sorted(FOLDER.glob("*.py")), ids=lambda file: file.stem)
+def test_generators_share_no_code_with_the_project(file):
+    tree = ast.parse(file.read_text(encoding="utf-8"))
+    modules = {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
+    modules |= {name.name for node in ast.walk(tree) if isinstance(node, ast.Import) for name in node.names}
+    own = {name for name in modules if name.split(".")[0] in {"sim", "gfimu", "firmware_bridge"}}
+    assert all(name.startswith("sim.benchmark.generators.") for name in own)
 
 
 @pytest.mark.parametrize("name", FOREIGN)
@@ -186,7 +195,7 @@ def test_a_leaning_cube_reads_gravity_and_a_sunken_bench_reads_it_in_turn():
 def test_friction_holds_the_table_and_hides_nothing():
     run, spin = _campaign_motion(1, 0, PLAN)
     held, _ = _sensed(_held_by_bristles({"coulomb_N_m": 0.15}, spin, run.t), run.t, run.seed)
-    gripped = _table_motion(1, 0, PLAN, 0.15)[0]
+    gripped = table_motion(1, 0, PLAN, 0.15)[0]
     assert np.abs(held.rate - run.rate).max() > 0.01
     assert np.abs(gripped.rate - table().rate).max() > 0.01
     inner = slice(50, -50)

@@ -1,6 +1,6 @@
 """Write docs/reference/files.md, the reference of the files that a user writes by hand, from their schemas.
 
-The JSON schema of a certificate, which `gfimu certificate` writes, is published with it.
+The JSON schemas of all kinds, and that of a certificate, which `gfimu certificate` writes, are published with it.
 
 Run ``python docs/scripts/make_files_reference.py``.
 """
@@ -11,9 +11,10 @@ from pathlib import Path
 
 from gfimu.certification.schema import SCHEMA_FILE, certificate_schema
 from gfimu.commands.file_kinds import FILE_KINDS, file_schema
-from gfimu.files.schema_keys import TableRows, table_rows
+from gfimu.files.schema_keys import TableRows, json_schema, table_rows
 
 PAGE = Path(__file__).resolve().parents[1] / "reference" / "files.md"
+SCHEMAS = PAGE.parent / "schemas"
 
 INTRODUCTION = """\
 # Files key by key
@@ -25,7 +26,8 @@ for people.
 
 Editors with [taplo](https://taplo.tamasfe.dev) (Even Better TOML in VS Code) complete and check these files by a JSON
 schema. `gfimu new array --out my_array.toml --schema array.schema.json` writes the file, the schema, and the line
-`#:schema ./array.schema.json` that connects the two.
+`#:schema ./array.schema.json` that connects the two. The schemas are also here:
+SCHEMA_LINKS.
 
 Units stand at the end of a key. Frames and signs are in [Conventions](conventions.md), recordings in
 [Formats](recording-format.md).
@@ -54,7 +56,8 @@ Segments fit on a line each: `segment = [{ kind = "hold", duration_s = 3.0 }, â€
 
 def files_page() -> str:
     """Return the text of the page."""
-    parts = [INTRODUCTION]
+    links = ", ".join(f"[{name}](schemas/{name})" for name in schema_files())
+    parts = [INTRODUCTION.replace("SCHEMA_LINKS", links)]
     for kind, schema in FILE_KINDS.items():
         parts.append(f"## {kind.capitalize()}\n")
         parts += [_table(rows) for rows in table_rows(file_schema(kind))]
@@ -62,6 +65,11 @@ def files_page() -> str:
             parts.append(AFTER[kind])
         parts.append(f"Schema: `{schema}`.\n")
     return "\n".join(parts)
+
+
+def schema_files() -> dict[str, str]:
+    """Return the JSON schema of every kind by the name of its file."""
+    return {f"{kind}.schema.json": json_schema(file_schema(kind), kind) for kind in FILE_KINDS}
 
 
 def _table(rows: TableRows) -> str:
@@ -80,4 +88,7 @@ def _cell(text: str) -> str:
 
 if __name__ == "__main__":
     PAGE.write_text(files_page(), encoding="utf-8")
+    SCHEMAS.mkdir(exist_ok=True)
+    for name, text in schema_files().items():
+        (SCHEMAS / name).write_text(text, encoding="utf-8")
     SCHEMA_FILE.write_text(certificate_schema(), encoding="utf-8")

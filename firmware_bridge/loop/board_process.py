@@ -7,6 +7,7 @@ with the caller and is asked for in batches.
 from __future__ import annotations
 
 import multiprocessing
+import signal
 import sys
 import threading
 from array import array
@@ -87,7 +88,7 @@ class BoardProcess:
         self._process = context.Process(
             target=_work, args=(theirs, path, tuple(chips), self.fast, trace, lose_every, array), daemon=True
         )
-        with _without_main():
+        with _without_main(), _without_interrupt():
             self._process.start()
         theirs.close()
         self._call("ready")
@@ -205,6 +206,22 @@ def _without_main() -> Iterator[None]:
         yield
     finally:
         sys.modules["__main__"] = main
+
+
+@contextmanager
+def _without_interrupt() -> Iterator[None]:
+    """Let a new process leave Ctrl-C, which a terminal sends to every process, to the one that starts it.
+
+    A process begins with the blocked signals of the thread that starts it.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _work(

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, overload
 
+from gfimu.commands.former_arguments import former_arguments
 from gfimu.errors import InputError
 from gfimu.files.outputs import RECORDING, TRACE, OutputFolder, writes
 from gfimu.optional_packages import require
@@ -274,10 +275,11 @@ def faults(*, seed: int = 0, progress: Callable[[float], None] | None = None) ->
     return run_campaign(seed=seed, progress=progress)
 
 
+@former_arguments(seconds="duration")
 def check(
     image: str | Path = "gfimu",
     *,
-    seconds: float = 3.0,
+    duration: float = 3.0,
     chips: int = 4,
     baud: int | None = None,
     time_limit: float = 60.0,
@@ -288,7 +290,7 @@ def check(
     ----------
     image : str or Path
         Image: gfimu, selfcheck, or an ELF or .bin file.
-    seconds : float
+    duration : float
         Virtual time to run, s.
     chips : int
         ADXL345s on SSP1, 0 to 4; their chip-selects are P2.0 and so on.
@@ -304,7 +306,7 @@ def check(
     """
     from firmware_bridge.strict.check import CheckOptions, check_image
 
-    return check_image(image, CheckOptions(seconds, chips, baud, time_limit))
+    return check_image(image, CheckOptions(duration, chips, baud, time_limit))
 
 
 def _ride(scenario: str | Path, seed: int) -> Ride:

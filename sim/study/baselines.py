@@ -8,52 +8,24 @@ noise, as is usual.
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
-from contextlib import redirect_stdout
-from dataclasses import dataclass
-from io import StringIO
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter1d
 
-from gfimu.errors import InputError, unknown_name
-from gfimu.recording import Recording
-from sim.effects import Effect, make_effect
-from sim.motion import SplineSpin
+from gfimu.errors import unknown_name
+from sim.benchmark.baselines.sysid import identify
+from sim.benchmark.library import Block, Candidate, LinearLibrary
+from sim.effects import make_effect
 from sim.study.cases import Case
 from sim.study.outcome import HiddenWorld, draw_world, processor_time
 
 __all__ = ["METHODS", "run_baseline"]
 
-_SMOOTHING = 0.03  # of the tachometer, s
 _MOST_CAUSES = 5
 _SIGNIFICANT = 4.0
 _SEEN = 1e-6  # standard deviation as a share of the prior below which a coordinate was left out, not measured
-_HALF_WIDTH = 1.96  # of a 95 % interval, in standard deviations
-_STEP = 0.1  # finite difference as a share of the prior's standard deviation
-
-
-@dataclass(frozen=True)
-class _Block:
-    """Columns of one family at one shape, and the places its sizes may be confined to."""
-
-    family: type[Effect]
-    columns: slice
-    keys: tuple[str, ...]
-    places: tuple[NDArray[np.float64], ...]
-
-
-@dataclass(frozen=True)
-class _Normal:
-    """Normal equations of all columns against the residual, in units of the noise."""
-
-    blocks: tuple[_Block, ...]
-    gram: NDArray[np.float64]
-    score: NDArray[np.float64]
-    scale: NDArray[np.float64]
-    samples: int
 
 
 def run_baseline(method: str, case: Case, source: str = "") -> dict[str, Any]:
@@ -76,115 +48,30 @@ def run_baseline(method: str, case: Case, source: str = "") -> dict[str, Any]:
     }
 
 
-class _KnownDrive:
-    """Predictions for a recording whose smoothed tachometer is taken for the truth."""
-
-    def __init__(self, world: HiddenWorld) -> None:
-        recording, self._twin = world.recording, world.twin
-        self._t = recording.t_s
-        self._rate = gaussian_filter1d(recording.reference["tacho_rad_s"], _SMOOTHING / recording.sample_period)
-        self._temperature = recording.reference.get("temperature_degC")
-        self._motion = SplineSpin.through(self._t, self._rate)
-        self.nominal, self._reference = self._predict(self._motion, ())
-
-    def _predict(
-        self, motion: SplineSpin, effects: Sequence[Effect]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        return self._twin.predict(motion, self._t, effects=effects, temperature=self._temperature)
-
-    def readings(self, effect: Effect) -> NDArray[np.float64]:
-        """Return the channels (n, c) with an effect, m/s²; a wrong reference means another motion than it says."""
-        moved, reading = self._predict(self._motion, [effect])
-        if np.array_equal(reading, self._reference):
-            return moved
-        corrected = SplineSpin.through(self._t, self._rate - (reading - self._reference))
-        return self._predict(corrected, ())[0]
-
-
-def _normal_equations(world: HiddenWorld) -> _Normal:
-    recording, twin = world.recording, world.twin
-    white = twin.expected_noise(recording.sample_rate).white
-    drive = _KnownDrive(world)
-    residual = recording.for_array(twin.array) - drive.nominal
-
-    blocks: list[_Block] = []
-    columns: list[NDArray[np.float64]] = []
-    scale: list[float] = []
-    for family in twin.families().values():
-        sizes = family.sizes(twin.array)
-        for shape in _shapes(family, recording, residual) if sizes else ():
-            first = len(columns)
-            for number, size in enumerate(sizes):
-                values = np.zeros(len(sizes))
-                values[number] = _STEP * size.prior_std
-                moved = drive.readings(family.from_sizes(twin.array, values, shape))
-                columns.append(((moved - drive.nominal) / white).ravel() / _STEP)
-                scale.append(size.prior_std)
-            blocks.append(
-                _Block(
-                    family,
-                    slice(first, len(columns)),
-                    tuple(size.key for size in sizes),
-                    tuple(pattern.mixing for pattern in family.patterns(twin.array)),
-                )
-            )
-    design = np.column_stack(columns)
-    score = design.T @ np.nan_to_num(residual / white).ravel()
-    return _Normal(tuple(blocks), design.T @ design, score, np.array(scale), residual.size)
-
-
-def _shapes(family: type[Effect], recording: Recording, residual: NDArray[np.float64]) -> tuple[dict[str, float], ...]:
-    """Return the grid of a family; a tone is put at the highest line of the mean periodogram."""
-    if family.name != "interference_tone":
-        return family.shapes(recording.duration, recording.sample_rate)
-    power = np.mean(np.abs(np.fft.rfft(residual - residual.mean(axis=0), axis=0)) ** 2, axis=1)
-    line = int(np.argmax(power[1:])) + 1
-    return ({"frequency_hz": line * recording.sample_rate / len(residual)},)
-
-
 def _greedy_bic(world: HiddenWorld) -> list[dict[str, Any]]:
     """Add the place of a family that lowers BIC most, until none does (Schwarz 1978)."""
-    normal = _normal_equations(world)
-    candidates = []
-    for block in normal.blocks:
-        for mixing in block.places:
-            spread = np.zeros((len(normal.score), mixing.shape[1]))
-            spread[block.columns] = mixing
-            candidates.append((block, spread))
-    chosen: list[tuple[_Block, NDArray[np.float64]]] = []
+    library = LinearLibrary.of(world.recording, world.twin)
+    chosen: list[Candidate] = []
     reached = 0.0
     for _ in range(_MOST_CAUSES):
-        taken = [spread for _, spread in chosen]
-        gains = [_explained(normal, [*taken, spread]) for _, spread in candidates]
-        penalised = [
-            gain - sum(matrix.shape[1] for matrix in [*taken, spread]) * np.log(normal.samples)
-            for gain, (_, spread) in zip(gains, candidates, strict=True)
+        gains = [
+            library.explained([*chosen, one]) - sum(each.free for each in [*chosen, one]) * np.log(library.samples)
+            for one in library.candidates
         ]
-        best = int(np.argmax(penalised))
-        if penalised[best] <= reached:
+        best = int(np.argmax(gains))
+        if gains[best] <= reached:
             break
-        reached = penalised[best]
-        chosen.append(candidates[best])
+        reached = gains[best]
+        chosen.append(library.candidates[best])
     if not chosen:
         return []
-    mixing = np.hstack([spread for _, spread in chosen])
-    covariance = np.linalg.pinv(mixing.T @ normal.gram @ mixing, rcond=1e-10)
-    estimate = mixing @ (covariance @ (mixing.T @ normal.score))
-    std = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", mixing, covariance, mixing), 0.0))
-    return _causes(normal, {block.family.name: block for block, _ in chosen}, estimate, std, dict(world.truth))
-
-
-def _explained(normal: _Normal, spreads: list[NDArray[np.float64]]) -> float:
-    """Drop of χ² by free coordinates."""
-    mixing = np.hstack(spreads)
-    score = mixing.T @ normal.score
-    return float(score @ np.linalg.pinv(mixing.T @ normal.gram @ mixing, rcond=1e-10) @ score)
+    return _causes(library, {one.effect: one.block for one in chosen}, *library.fit(chosen), dict(world.truth))
 
 
 def _everything(world: HiddenWorld) -> list[dict[str, Any]]:
     """Fit all families together and name those with a coordinate of more than four standard deviations."""
-    normal = _normal_equations(world)
-    first: dict[str, _Block] = {}
+    normal = LinearLibrary.of(world.recording, world.twin)
+    first: dict[str, Block] = {}
     for block in normal.blocks:
         first.setdefault(block.family.name, block)
     places = np.concatenate([np.arange(b.columns.start, b.columns.stop) for b in first.values()])
@@ -205,8 +92,8 @@ def _everything(world: HiddenWorld) -> list[dict[str, Any]]:
 
 
 def _causes(
-    normal: _Normal,
-    named: Mapping[str, _Block],
+    normal: LinearLibrary,
+    named: Mapping[str, Block],
     estimate: NDArray[np.float64],
     std: NDArray[np.float64],
     truth: Mapping[str, Mapping[str, Any]],
@@ -238,42 +125,11 @@ def _told_sysid(world: HiddenWorld) -> list[dict[str, Any]]:
     places = np.flatnonzero(effect.size_values(array))
     if not len(places):
         return []
-    estimate, std = _identify(world, effect, places)
+    estimate, std = identify(world, effect, places)
     keys = [effect.sizes(array)[place].key for place in places]
     z = (estimate - effect.size_values(array)[places]) / std
     scores = {key: round(float(value), 3) for key, value in zip(keys, z, strict=True)}
     return [{"effect": name, "place": "", "probability": 1.0, "log_odds": None, "rivals": [], "z": scores}]
-
-
-def _identify(
-    world: HiddenWorld, effect: Effect, places: NDArray[np.intp]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Fit some sizes of an effect with ``mujoco.sysid``; returns estimates and standard deviations."""
-    from mujoco import sysid
-
-    if not hasattr(sysid, "optimize"):
-        raise InputError('MuJoCo\'s system identification is not installed: pip install "mujoco[sysid]"')
-    array, shape = world.twin.array, effect.shape_values()
-    measured, drive = world.recording.for_array(array), _KnownDrive(world)
-    priors = np.array([size.prior_std for size in effect.sizes(array)])
-
-    def residual(x: NDArray[np.float64], parameters: Any) -> tuple[list[NDArray[np.float64]], None, None]:
-        columns = []
-        for free in np.reshape(x, (len(places), -1)).T:
-            values = np.zeros(len(priors))
-            values[places] = free * priors[places]
-            left = drive.readings(type(effect).from_sizes(array, values, shape)) - measured
-            columns.append(sysid.normalize_residual(left, measured).ravel())
-        return [np.array(columns).T if np.ndim(x) > 1 else columns[0]], None, None
-
-    sizes = sysid.ParameterDict()
-    for place in places:  # in units of the prior, for the optimiser's sake
-        sizes.add(sysid.Parameter(str(place), 0.0, -1e3, 1e3))
-    with redirect_stdout(StringIO()):  # its optimiser prints each iteration
-        fitted, result = sysid.optimize(sizes, residual, verbose=False, max_iters=20)
-    final, *_ = residual(fitted.as_vector(), fitted)
-    _, half_widths = sysid.calculate_intervals(final, np.asarray(result.jac))
-    return fitted.as_vector() * priors[places], np.asarray(half_widths) / _HALF_WIDTH * priors[places]
 
 
 METHODS = {"greedy BIC": _greedy_bic, "everything at once": _everything, "mujoco.sysid, told": _told_sysid}

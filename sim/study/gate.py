@@ -25,8 +25,8 @@ GATE = "gate"
 LONGEST = 8.0
 """Processor time of a case, s, above which it is not chosen: three quarters of all cases take less."""
 _LIST = Path(__file__).with_name("gate.txt")
-_OTHER = "tests/independent_world.py:hide"
-_PROGRAMMED = "tests/independent_profiles.py:hide"
+_OTHER = "sim/benchmark/generators/independent_world.py:hide"
+_PROGRAMMED = "sim/benchmark/generators/independent_profiles.py:hide"
 
 
 @dataclass(frozen=True)

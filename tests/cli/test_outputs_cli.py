@@ -27,6 +27,7 @@ OTHER_WORDS = {
 
 PYTHON_NAME = {
     "list": "catalogue",
+    "benchmark list": "benchmark_list",
     "campaign status": "campaign_status",
     "campaign table": "campaign_table",
     "campaign plot": "campaign_plot",
@@ -68,10 +69,14 @@ CALLS = {
     "optimize": {"chips": "4", "restarts": "1"},
     "demo": {},
     "new": {"kind": "array", "out": "made.toml"},
+    "schema": {"command": "score", "out": "made.json"},
     "tolerance": {"array": "cube12", "units": "10", "workers": "1"},
     "campaign": {"plan": "in.toml", "out": "made"},
     "campaign table": {"folder": "campaign"},
     "campaign plot": {"folder": "campaign", "out": "made.png"},
+    "benchmark worlds": {"out": "made", "limit": "1"},
+    "benchmark run": {"method": "always_unknown", "out": "made", "limit": "1"},
+    "benchmark judge": {"answers": "in.jsonl", "out": "made.jsonl"},
     "firmware run": {},
     "firmware build": {},
     "firmware trace": {"out": "made.vcd"},

@@ -10,15 +10,15 @@ from types import SimpleNamespace
 import mujoco
 import numpy as np
 import pytest
-from independent_effects import DRAWS, SIZELESS, rig_with
-from independent_table import Rig, TableRun, drive_table
-from independent_world import Setting, noise_free
 from scipy.interpolate import CubicSpline
 from scipy.signal import lsim, lti
 
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
 from sim import forward
+from sim.benchmark.generators.independent_effects import DRAWS, SIZELESS, rig_with
+from sim.benchmark.generators.independent_table import Rig, TableRun, drive_table
+from sim.benchmark.generators.independent_world import Setting, noise_free
 from sim.campaign import random_profile
 from sim.effects import EFFECTS, Effect, apply_effects, make_effect
 from sim.effects.low_pass import low_pass, mass_on_spring

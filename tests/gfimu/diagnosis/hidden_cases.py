@@ -14,11 +14,11 @@ from sim.study.cases import EXOTICS, Case, study_cases
 from sim.study.outcome import HiddenWorld, outcome_of
 from sim.study.report import score
 
-_TESTS = Path(__file__).resolve().parents[2]
+_GENERATORS = Path(__file__).resolve().parents[3] / "sim" / "benchmark" / "generators"
 SOURCES = {
     "campaign": "",
-    "independent": f"{_TESTS / 'independent_world.py'}:hide",
-    "programmed": f"{_TESTS / 'independent_profiles.py'}:hide",
+    "independent": f"{_GENERATORS / 'independent_world.py'}:hide",
+    "programmed": f"{_GENERATORS / 'independent_profiles.py'}:hide",
 }
 """Generators of worlds: the project's own; one that shares no code with it; the same under programmed commands."""
 

@@ -34,7 +34,7 @@ def test_a_walk_is_found_beside_a_slow_cause_that_is_right():
     """In 15 s one slow cause of two passes for the walk; without both a walk fits worse than with both it would."""
     settings = {"duration": 15.0, "sample_rate": 200.0, "bias_instability_mg": 0.061, "tacho_noise": 0.0436}
     case = Case("walks", 872_020, ("bias_random_walk", "scale_factor"), 207.8, **settings)
-    generator = str(Path(__file__).parents[2] / "independent_world.py:hide")
+    generator = str(Path(__file__).parents[3] / "sim" / "benchmark" / "generators" / "independent_world.py:hide")
     world = draw_world(case, generator)
     found = diagnose([world.recording], world.twin)
     assert {cause.effect for cause in found.causes} == {"bias_random_walk", "scale_factor"}

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from independent_world import hide
 from scipy.spatial.transform import Rotation
 
 from gfimu import AccelerometerArray, InputError, Recording, estimate, specific_force
@@ -16,6 +15,7 @@ from gfimu.parts.limits import PartLimits
 from gfimu.recording.checks import check_recording, refuse_or_warn
 from gfimu.recording.formats import open_run
 from gfimu.units import STANDARD_GRAVITY
+from sim.benchmark.generators.independent_world import hide
 from sim.scenarios import Scenario, simulate
 
 CUBE = AccelerometerArray.load("cube12")

@@ -20,7 +20,7 @@ def page(project_root):
 def cube():
     return {
         "ADXL345": gfimu.tolerance("cube12", closed_form=True).budgets,
-        "ADXL355": gfimu.tolerance("cube12", closed_form=True, part="adxl355", rate=10.0).budgets,
+        "ADXL355": gfimu.tolerance("cube12", closed_form=True, part="adxl355", speed_rad_s=10.0).budgets,
     }
 
 

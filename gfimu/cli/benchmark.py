@@ -1,0 +1,182 @@
+"""`gfimu benchmark`: the open benchmark of naming what a simulation gets wrong: list, worlds, run, judge, table."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import typer
+
+from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, print_text, progress
+
+__all__ = ["register"]
+
+SetsOption = Annotated[
+    list[str] | None,
+    typer.Option("--sets", metavar="SET", help="Set; may be repeated. All that are drawn by default."),
+]
+SplitOption = Annotated[
+    str, typer.Option("--split", metavar="dev|test", help="Worlds to develop on, or those of the published table.")
+]
+LimitOption = Annotated[
+    int | None, typer.Option("--limit", min=1, help="Only so many worlds of each set, which stand in random order.")
+]
+DataOption = Annotated[
+    Path | None, typer.Option("--data", metavar="DIR", help="Folder of the measured data, for the set real.")
+]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands."""
+    group = typer.Typer(
+        help="Measure how well a method names what a simulation gets wrong: fixed worlds, a judge, baselines.\n\n"
+        "Example: gfimu benchmark run my_method.py:answer --out mine, then gfimu benchmark judge mine",
+        no_args_is_help=True,
+    )
+    group.command(name="list")(_list)
+    group.command(name="worlds")(_worlds)
+    group.command(name="run")(_run)
+    group.command(name="judge")(_judge)
+    group.command(name="table")(_table)
+    app.add_typer(group, name="benchmark")
+
+
+def _list(json: JsonOption = False) -> None:
+    """List the sets of the benchmark, their sizes and licences, and the methods that come with it.
+
+    Example: gfimu benchmark list
+    """
+    from gfimu.commands.benchmark import benchmark_list
+
+    found = benchmark_list()
+    if json:
+        print_json(found.to_dict())
+        return
+    rows = [(one["name"], one["about"], one["licence"], str(one["dev"]), str(one["test"])) for one in found.sets]
+    print_table(f"{found.release}, hash {found.digest}", ("set", "worlds", "licence", "dev", "test"), rows, left=3)
+    print_text(f"methods: {', '.join(found.methods)}, or FILE.py:function")
+
+
+def _worlds(
+    out: Annotated[Path, typer.Option("--out", help="Folder to write: a folder per world, and the schema of answers.")],
+    sets: SetsOption = None,
+    split: SplitOption = "dev",
+    limit: LimitOption = None,
+    form: Annotated[Literal["parquet", "csv"], typer.Option("--format", help="Format of the recordings.")] = "parquet",
+    json: JsonOption = False,
+) -> None:
+    """Write worlds as plain files, for a method in any language: a recording and a twin each, no truth.
+
+    Example: gfimu benchmark worlds --out worlds --sets own --limit 5 --format csv
+    """
+    from gfimu.commands.benchmark import worlds
+
+    with progress("worlds", total=1.0) as show:
+        found = worlds(out, sets=sets or [], split=split, limit=limit, form=form, progress=_shown("worlds", show))
+    if json:
+        print_json({"folder": out, "worlds": found})
+        return
+    print_text(f"{len(found)} worlds")
+    print_paths([("worlds", out), ("schema of answers", out / "answer.schema.json")])
+
+
+def _run(
+    method: Annotated[str, typer.Argument(help="FILE.py:function, or a method that comes with the benchmark.")],
+    out: Annotated[Path, typer.Option("--out", help="Folder to write; one that was begun is gone on with.")],
+    sets: SetsOption = None,
+    split: SplitOption = "dev",
+    limit: LimitOption = None,
+    name: Annotated[str, typer.Option("--name", help="Name in tables; that of the file by default.")] = "",
+    workers: Annotated[int | None, typer.Option("--workers", help="Processes; by default one per processor.")] = None,
+    data: DataOption = None,
+    json: JsonOption = False,
+) -> None:
+    """Run a method over worlds; a second call goes on where one ended.
+
+    Example: gfimu benchmark run my_method.py:answer --out mine
+
+    Example: gfimu benchmark run greedy_bic --out greedy --sets own --limit 10
+    """
+    from gfimu.commands.benchmark import run
+
+    title = f"benchmark {method}"
+    with progress(title, total=1.0, time_left=False) as show:
+        found = run(
+            method,
+            out=out,
+            sets=sets or [],
+            split=split,
+            limit=limit,
+            name=name,
+            workers=workers,
+            data=data,
+            progress=_shown(title, show),
+        )
+    if json:
+        print_json(found.to_dict())
+        return
+    failed = f", the method failed in {found.failed}" if found.failed else ""
+    print_text(f"{found.method}: {found.worlds} worlds{failed}")
+    print_paths([("answers", found.answers)])
+
+
+def _judge(
+    answers: Annotated[list[Path], typer.Argument(help="Answers (.jsonl, .jsonl.xz), or folders of runs.")],
+    out: Annotated[
+        Path | None, typer.Option("--out", help="File to write: judged answers (.jsonl or .jsonl.xz).")
+    ] = None,
+    partial: Annotated[
+        bool, typer.Option("--partial", help="Leave out worlds without an answer, instead of counting them as errors.")
+    ] = False,
+    data: DataOption = None,
+    json: JsonOption = False,
+) -> None:
+    """Judge answers by the truth: right, in a set, unknown, missed, wrong; sizes, prediction, time.
+
+    Example: gfimu benchmark judge mine --out mine.jsonl
+    """
+    from gfimu.commands.benchmark import judge
+
+    found = judge([*answers], out=out, partial=partial, data=data)
+    if json:
+        print_json(found.to_dict())
+        return
+    _print(found)
+    if out is not None:
+        print_paths([("judged answers", out)])
+
+
+def _table(
+    results: Annotated[list[Path], typer.Argument(help="Judged answers, as judge --out writes them.")],
+    markdown: Annotated[bool, typer.Option("--markdown", help="Print a table in Markdown.")] = False,
+    json: JsonOption = False,
+) -> None:
+    """Summarise judged answers of one or several methods, with 95 % intervals.
+
+    Example: gfimu benchmark table mine.jsonl greedy.jsonl
+    """
+    from gfimu.commands.benchmark import table
+
+    found = table([*results])
+    if json:
+        print_json(found.to_dict())
+    elif markdown:
+        typer.echo(found.to_markdown(), nl=False)
+    else:
+        _print(found)
+
+
+def _print(found: Any) -> None:
+    """Print a table per set, a column per method."""
+    from sim.benchmark.table import COLUMNS
+
+    for name in dict.fromkeys(one.set_name for one in found.summaries):
+        columns = [one.row()[1:] for one in found.summaries if one.set_name == name]
+        first, *rows = zip(COLUMNS[1:], *columns, strict=True)
+        print_table(name, first, rows)
+    print_text("points: right 1, tied, in part or in a set of k 1/2 or 1/k, unknown 0.25, missed 0, wrong name or false alarm -1")
+
+
+def _shown(title: str, show: Any) -> Callable[[int, int], None]:
+    return lambda done, total: show(done / max(total, 1), f"{title}: {done} of {total}")

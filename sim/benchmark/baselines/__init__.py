@@ -1,0 +1,1 @@
+"""Baselines of the benchmark, one file each: examples of a method, and marks to compare with."""

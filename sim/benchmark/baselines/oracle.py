@@ -1,0 +1,26 @@
+"""The oracle: it is given names and shapes and fits the sizes; no method that has to find them can do better.
+
+It reads the truth of the release, as any program could: a published benchmark rests on the good faith of its users.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from sim.benchmark.library import fitted_sizes
+from sim.benchmark.truth_file import fixed_world
+from sim.benchmark.world import Task
+from sim.effects import EFFECTS, make_effect
+
+__all__ = ["answer"]
+
+
+def answer(task: Task) -> dict[str, Any]:
+    """Name what is hidden, with sizes by least squares at the smoothed tachometer, started at the true ones."""
+    truth = fixed_world(task.world).truth
+    if not truth.hidden or truth.place == "nothing":
+        return {"verdict": "nothing_found"}
+    if any(name not in EFFECTS for name, _ in truth.hidden):
+        return {"verdict": "explained", "causes": [{"effect": "unlisted", "place": truth.place}]}
+    effects = [make_effect(name, parameters) for name, parameters in truth.hidden]
+    return {"verdict": "explained", "causes": fitted_sizes(task.recording, task.twin, effects)}

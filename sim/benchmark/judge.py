@@ -1,0 +1,321 @@
+"""The judge: what an answer is worth, by the truth of the release alone.
+
+It knows no method: names are compared with what is hidden and with the ties of the release, sizes with the true ones,
+predictions with another motion of the same world.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gfimu.errors import GfimuError
+from sim.benchmark.answer import Answer, CauseAnswer
+from sim.benchmark.drawing import fresh_motion, nominal_twin
+from sim.benchmark.real import beyond_stated, held_out_recording, prediction_error, real_task
+from sim.benchmark.release import MEASURED, find_case
+from sim.benchmark.truth_file import Fixed, fixed_world
+from sim.benchmark.world import FreshMotion, Truth
+from sim.effects import Effect, make_effect
+
+__all__ = ["POINTS", "Claim", "Judged", "claims_of", "judge", "outcome_of"]
+
+POINTS = {
+    "alone": 1.0,
+    "quiet": 1.0,
+    "set": 0.5,
+    "part": 0.5,
+    "unknown": 0.25,
+    "missed": 0.0,
+    "error": 0.0,
+    "wrong": -1.0,
+    "false_alarm": -1.0,
+    "measured": math.nan,
+    "contradicted": math.nan,
+}
+"""Points by outcome; of a set of k names at most 1/k, and of ``unknown`` twice as many where no name would be right.
+
+Somebody who is given a wrong name repairs the wrong part and still has a wrong simulation; ``unknown`` costs a further
+look. With these points a single name pays from a probability of 5/8 on: p − (1 − p) > 1/4.
+"""
+
+LEAST_MOVED = 15.0
+"""d′ that what is hidden must have in the fresh motion for its removal to be measured."""
+
+_NOT_A_NAME = "unknown"
+_TURN = 2 * math.pi
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One claim of an answer: that one of these names is a cause.
+
+    Parameters
+    ----------
+    names : frozenset of str
+        A single name, or a set that the method can't tell apart.
+    causes : tuple of CauseAnswer
+        The causes behind it.
+    """
+
+    names: frozenset[str]
+    causes: tuple[CauseAnswer, ...]
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What an answer is worth.
+
+    Parameters
+    ----------
+    world, method : str
+        Of the answer.
+    hidden, said : tuple of str
+        Names that are hidden, and the claims: a set is written ``a|b``.
+    outcome : str
+        ``alone`` (all hidden names and no other), ``set`` (in a set, or a tie of it), ``part`` (some of several),
+        ``unknown``, ``missed``, ``wrong``, ``error``; with nothing hidden ``quiet`` or ``false_alarm``; of measured
+        data ``measured``, or ``contradicted`` where a size is beyond what the makers state.
+    points : float
+        See `POINTS`.
+    z : tuple of float
+        (estimate − truth)/std of each size that has a std, of causes that are hidden.
+    removed : float
+        Share of the squared distance to the true world that the answer removes in a motion that no method saw; NaN
+        where it can't be measured.
+    expected_ratio : float
+        Rms error that the method expects on a new recording over the one that its answer has there; NaN likewise.
+    processor_s : float
+        Processor time, s; NaN where it is not given.
+    """
+
+    world: str
+    method: str
+    hidden: tuple[str, ...]
+    said: tuple[str, ...]
+    outcome: str
+    points: float
+    z: tuple[float, ...] = ()
+    removed: float = math.nan
+    expected_ratio: float = math.nan
+    processor_s: float = math.nan
+
+    @property
+    def set_name(self) -> str:
+        """Set of the world."""
+        return self.world.partition("/")[0]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON form; NaN becomes null."""
+        numbers = {name: getattr(self, name) for name in ("points", "removed", "expected_ratio", "processor_s")}
+        return {
+            "world": self.world,
+            "method": self.method,
+            "hidden": list(self.hidden),
+            "said": list(self.said),
+            "outcome": self.outcome,
+            "z": [round(value, 3) for value in self.z],
+            **{name: None if math.isnan(value) else float(f"{value:.5g}") for name, value in numbers.items()},
+        }
+
+
+def judge(answers: Iterable[Answer], data: str | Path = "") -> list[Judged]:
+    """Judge answers by the truth of the release.
+
+    Parameters
+    ----------
+    answers : iterable of Answer
+        Any worlds, in any order.
+    data : str or Path
+        Folder of the measured data, for answers to worlds of the set ``real``.
+
+    Raises
+    ------
+    InputError
+        If a world is not of the release, or measured data are needed and not there.
+    """
+    return [
+        _judged_measured(answer, data)
+        if find_case(answer.world).generator == MEASURED
+        else _judged(answer, fixed_world(answer.world))
+        for answer in answers
+    ]
+
+
+def _judged_measured(answer: Answer, data: str | Path) -> Judged:
+    """Judge an answer for measured data: no truth, but what makers state, and the error on another recording."""
+    claims, recording = claims_of(answer), held_out_recording(answer.world, data)
+    twin = real_task(answer.world, data).twin
+    if answer.verdict == "error":
+        outcome, removed, ratio = "error", math.nan, math.nan
+    else:
+        outcome = "contradicted" if beyond_stated(answer.causes) else "measured"
+        before, after = (prediction_error(twin, effects, recording) for effects in ((), _effects(claims)))
+        removed = max(1.0 - (after / before) ** 2, -1.0)
+        ratio = math.nan if answer.expected_rms_m_s2 is None else answer.expected_rms_m_s2 / after
+    said = tuple("|".join(sorted(claim.names)) for claim in claims) or (answer.verdict,)
+    taken = math.nan if answer.processor_s is None else answer.processor_s
+    return Judged(answer.world, answer.method, (), said, outcome, math.nan, (), removed, ratio, taken)
+
+
+def _judged(answer: Answer, fixed: Fixed) -> Judged:
+    truth, claims = fixed.truth, claims_of(answer)
+    outcome, share = outcome_of(truth, answer, claims, unlisted=fixed.case.set_name == "unlisted")
+    points = POINTS[outcome]
+    if outcome == "set":
+        points = min(points, share)
+    if outcome == "unknown" and fixed.case.set_name == "unlisted" and truth.place != "nothing":
+        points *= 2.0
+    removed, ratio = _prediction(answer, claims, fixed)
+    return Judged(
+        answer.world,
+        answer.method,
+        tuple(name for name, _ in truth.hidden),
+        tuple("|".join(sorted(claim.names)) for claim in claims) or ((answer.verdict,)),
+        outcome,
+        points,
+        tuple(_z_scores(claims, truth)),
+        removed,
+        ratio,
+        math.nan if answer.processor_s is None else answer.processor_s,
+    )
+
+
+def name_of(cause: CauseAnswer) -> str:
+    """Return the name by which a cause is judged."""
+    return cause.name or cause.effect
+
+
+def claims_of(answer: Answer) -> list[Claim]:
+    """Return the claims of an answer: causes that name each other as not distinguishable are one claim."""
+    claims: list[Claim] = []
+    for cause in answer.causes:
+        if name_of(cause) == _NOT_A_NAME:
+            continue
+        names, causes = {name_of(cause), *cause.not_distinguishable_from}, [cause]
+        for other in [claim for claim in claims if claim.names & names]:
+            claims.remove(other)
+            names |= other.names
+            causes = [*other.causes, *causes]
+        claims.append(Claim(frozenset(names), tuple(causes)))
+    return claims
+
+
+def outcome_of(truth: Truth, answer: Answer, claims: Sequence[Claim], *, unlisted: bool) -> tuple[str, float]:
+    """Return the outcome of an answer and, of a set, one over its largest number of names."""
+    if answer.verdict == "error":
+        return "error", 0.0
+    claims = [claim for claim in claims if not claim.names <= set(truth.allowed)]
+    largest = 1.0 / max((len(claim.names) for claim in claims), default=1)
+    if not truth.hidden or truth.place == "nothing":
+        if claims:
+            return "false_alarm", 0.0
+        return ("unknown" if answer.verdict == "unknown" else "quiet"), 0.0
+    if not claims:
+        return ("unknown" if answer.verdict == "unknown" else "missed"), 0.0
+    if unlisted:
+        return _outcome_of_unlisted(truth, claims), largest
+    return _outcome_of_listed(truth, claims), largest
+
+
+def _outcome_of_listed(truth: Truth, claims: Sequence[Claim]) -> str:
+    waiting = {name for name, _ in truth.hidden}
+    alone = all(len(claim.names) == 1 for claim in claims)
+    others = []
+    for claim in claims:
+        found = waiting & claim.names
+        if found:
+            waiting.discard(min(found))
+        else:
+            others.append(claim)
+    for claim in others:  # a tie stands for a hidden effect that no claim names itself
+        tied = sorted(name for name in waiting if claim.names & set(truth.ties.get(name, ())))
+        if not tied:
+            return "wrong"
+        waiting.discard(tied[0])
+        alone = False
+    if waiting:
+        return "part"
+    return "alone" if alone else "set"
+
+
+def _outcome_of_unlisted(truth: Truth, claims: Sequence[Claim]) -> str:
+    certain = True
+    for claim in claims:
+        right = bool(claim.names & set(truth.right)) or any(_describes(cause, truth) for cause in claim.causes)
+        if not right and not claim.names & set(truth.near):
+            return "wrong"
+        certain = certain and right and len(claim.names) == 1
+    return "alone" if certain else "set"
+
+
+def _describes(cause: CauseAnswer, truth: Truth) -> bool:
+    """Whether a cause describes what is hidden by its place; one that states a name or a dependence is judged by it."""
+    return cause.effect == "unlisted" and not cause.name and not cause.dependence and cause.place == truth.place
+
+
+def _z_scores(claims: Sequence[Claim], truth: Truth) -> list[float]:
+    """Return (estimate − truth)/std of the sizes of causes that are hidden; angles are compared on the circle."""
+    hidden, scores = dict(truth.hidden), []
+    for cause in (cause for claim in claims for cause in claim.causes if name_of(cause) in hidden):
+        true = hidden[name_of(cause)]
+        given = {key: one.value for key, one in cause.parameters.items()}
+        # A nod about the opposite direction with the opposite phase is the same nod.
+        direction = given.get("direction_rad", 0.0)
+        turned = float(direction if isinstance(direction, float) else 0.0) - float(true.get("direction_rad", 0.0))
+        opposite = math.pi if math.cos(turned) < 0 else 0.0
+        for key, one in cause.parameters.items():
+            expected = true.get(key, 0.0)
+            if not one.std or not isinstance(one.value, float | int) or not isinstance(expected, float | int):
+                continue
+            error = float(one.value) - float(expected)
+            if key == "phase_rad":
+                error = (error + opposite + math.pi) % _TURN - math.pi
+            elif key == "direction_rad":
+                error = (error + math.pi / 2) % math.pi - math.pi / 2
+            scores.append(error / one.std)
+    return scores
+
+
+def _prediction(answer: Answer, claims: Sequence[Claim], fixed: Fixed) -> tuple[float, float]:
+    """Return the share of the squared distance that an answer removes in a fresh motion, and the ratio of errors."""
+    fresh = _fresh(answer.world)
+    if fresh is None or answer.verdict == "error":
+        return math.nan, math.nan
+    twin, effects = nominal_twin(fixed.case), _effects(claims)
+    with np.errstate(all="ignore"):  # an absurd size may overflow; the answer then removes nothing
+        before, after = fresh.distance(twin), fresh.distance(twin, effects)
+        rms = fresh.rms_error(twin, effects)
+    removed = 1.0 - (after / before) ** 2 if before >= LEAST_MOVED else math.nan
+    if not math.isfinite(after):
+        removed = -math.inf
+    ratio = math.nan if answer.expected_rms_m_s2 is None else answer.expected_rms_m_s2 / rms
+    return max(removed, -1.0) if not math.isnan(removed) else math.nan, ratio
+
+
+def _effects(claims: Sequence[Claim]) -> list[Effect]:
+    """Return the effects of an answer, of each claim the first with parameters; a description predicts nothing."""
+    found = []
+    for claim in claims:
+        for cause in claim.causes:
+            values = {key: one.value for key, one in cause.parameters.items()}
+            try:
+                effect = make_effect(name_of(cause), values)
+            except GfimuError:
+                continue
+            if values:
+                found.append(effect)
+                break
+    return found
+
+
+@functools.lru_cache(maxsize=512)
+def _fresh(world: str) -> FreshMotion | None:
+    fixed = fixed_world(world)
+    return fresh_motion(fixed.case, fixed.truth, fixed.case.seed(fixed.attempt))

@@ -1,0 +1,250 @@
+"""The library of effects as a linear model of one recording: columns, least squares, answers from them.
+
+What a method of any kind may begin with. The smoothed tachometer is taken for the motion of the table and the noise for
+white, as is usual; each column is the finite difference of the twin's prediction by one size of an effect.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
+
+from gfimu.recording import Recording
+from sim.effects import Effect
+from sim.motion import SplineSpin
+from sim.twin import Twin
+
+__all__ = ["Block", "Candidate", "KnownDrive", "LinearLibrary", "fitted_sizes"]
+
+Floats = NDArray[np.float64]
+
+_SMOOTHING = 0.03  # of the tachometer, s
+_STEP = 0.1  # finite difference as a share of the prior's standard deviation
+_NEAR = 0.02  # the same about effects that are large already
+_SINGULAR = 1e-10  # numerical: singular values below this share count as zero
+_SEEN = 1e-6  # standard deviation as a share of the prior below which a size was left out, not measured
+
+
+class KnownDrive:
+    """Predictions for a recording whose smoothed tachometer is taken for the truth.
+
+    Parameters
+    ----------
+    recording : Recording
+        With a tachometer.
+    twin : Twin
+        The simulation.
+    """
+
+    def __init__(self, recording: Recording, twin: Twin) -> None:
+        self._twin = twin
+        self._t = recording.t_s
+        self._rate = gaussian_filter1d(recording.reference["tacho_rad_s"], _SMOOTHING / recording.sample_period)
+        self._temperature = recording.reference.get("temperature_degC")
+        self._motion = SplineSpin.through(self._t, self._rate)
+        self.nominal, self._reference = self._predict(self._motion, ())
+
+    def _predict(self, motion: SplineSpin, effects: Sequence[Effect]) -> tuple[Floats, Floats]:
+        return self._twin.predict(motion, self._t, effects=effects, temperature=self._temperature)
+
+    def readings(self, *effects: Effect) -> Floats:
+        """Return the channels (n, c) with effects, m/s²; a wrong reference means another motion than it says."""
+        moved, reading = self._predict(self._motion, effects)
+        if np.array_equal(reading, self._reference):
+            return moved
+        corrected = SplineSpin.through(self._t, self._rate - (reading - self._reference))
+        return self._predict(corrected, ())[0]
+
+
+@dataclass(frozen=True)
+class Block:
+    """Columns of one kind of effect at one shape.
+
+    Parameters
+    ----------
+    family : type of Effect
+        The kind of effect.
+    shape : dict of str to float
+        Its shape parameters.
+    columns : slice
+        Where its columns stand.
+    keys : tuple of str
+        Contract key of each size.
+    places : tuple of ndarray, each of shape (m, k)
+        Mixing matrices of the places that its sizes may be confined to.
+    """
+
+    family: type[Effect]
+    shape: dict[str, float]
+    columns: slice
+    keys: tuple[str, ...]
+    places: tuple[Floats, ...]
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One effect at one place and shape: a term that a fit may include.
+
+    Parameters
+    ----------
+    effect : str
+        Contract name.
+    block : Block
+        Its columns.
+    spread : ndarray, shape (columns, k)
+        Its free coordinates as combinations of all columns.
+    """
+
+    effect: str
+    block: Block
+    spread: Floats
+
+    @property
+    def free(self) -> int:
+        """Number of free coordinates."""
+        return int(self.spread.shape[1])
+
+
+@dataclass(frozen=True)
+class LinearLibrary:
+    """All effects of a twin's library as columns against the residual of one recording.
+
+    Parameters
+    ----------
+    blocks : tuple of Block
+        Kinds of effects and shapes.
+    gram : ndarray, shape (m, m)
+        Normal matrix of the columns, in units of the noise and of the prior.
+    score : ndarray, shape (m,)
+        Columns times residual.
+    scale : ndarray, shape (m,)
+        Prior standard deviation of each size.
+    samples : int
+        Number of readings.
+    chi2 : float
+        Sum of squares of the residual, in units of the noise.
+    """
+
+    blocks: tuple[Block, ...]
+    gram: Floats
+    score: Floats
+    scale: Floats
+    samples: int
+    chi2: float
+
+    @classmethod
+    def of(cls, recording: Recording, twin: Twin) -> LinearLibrary:
+        """Compute the columns of a recording."""
+        white = twin.expected_noise(recording.sample_rate).white
+        drive = KnownDrive(recording, twin)
+        residual = np.nan_to_num(recording.for_array(twin.array) - drive.nominal)
+        blocks: list[Block] = []
+        columns: list[Floats] = []
+        scale: list[float] = []
+        for family in twin.families().values():
+            sizes = family.sizes(twin.array)
+            for shape in _shapes(family, recording, residual) if sizes else ():
+                first = len(columns)
+                for number, size in enumerate(sizes):
+                    values = np.zeros(len(sizes))
+                    values[number] = _STEP * size.prior_std
+                    moved = drive.readings(family.from_sizes(twin.array, values, shape))
+                    columns.append(((moved - drive.nominal) / white).ravel() / _STEP)
+                    scale.append(size.prior_std)
+                places = tuple(pattern.mixing for pattern in family.patterns(twin.array))
+                keys = tuple(size.key for size in sizes)
+                blocks.append(Block(family, shape, slice(first, len(columns)), keys, places))
+        design, whitened = np.column_stack(columns), (residual / white).ravel()
+        gram, score = design.T @ design, design.T @ whitened
+        return cls(tuple(blocks), gram, score, np.array(scale), residual.size, float(whitened @ whitened))
+
+    @cached_property
+    def candidates(self) -> tuple[Candidate, ...]:
+        """Every effect at every shape and place, each once."""
+        found = []
+        for block in self.blocks:
+            for mixing in block.places:
+                spread = np.zeros((len(self.score), mixing.shape[1]))
+                spread[block.columns] = mixing
+                found.append(Candidate(block.family.name, block, spread))
+        return tuple(found)
+
+    def explained(self, chosen: Sequence[Candidate]) -> float:
+        """Return the drop of χ² by a least-squares fit of some terms."""
+        mixing = np.hstack([one.spread for one in chosen])
+        score = mixing.T @ self.score
+        return float(score @ np.linalg.pinv(mixing.T @ self.gram @ mixing, rcond=_SINGULAR) @ score)
+
+    def fit(self, chosen: Sequence[Candidate]) -> tuple[Floats, Floats]:
+        """Return the sizes (m,) of a least-squares fit in units of the prior, and their standard deviations (m,)."""
+        mixing = np.hstack([one.spread for one in chosen])
+        covariance = np.linalg.pinv(mixing.T @ self.gram @ mixing, rcond=_SINGULAR)
+        estimate = mixing @ (covariance @ (mixing.T @ self.score))
+        return estimate, np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", mixing, covariance, mixing), 0.0))
+
+    def causes(self, chosen: Sequence[Candidate]) -> list[dict[str, Any]]:
+        """Return the causes of an answer: the terms with their fitted sizes, standard deviations and shapes."""
+        estimate, std = self.fit(chosen) if chosen else (np.empty(0), np.empty(0))
+        causes: list[dict[str, Any]] = []
+        for block in {one.effect: one.block for one in chosen}.values():
+            scale = self.scale[block.columns]
+            sizes = zip(block.keys, estimate[block.columns] * scale, std[block.columns] * scale, scale, strict=True)
+            parameters: dict[str, Any] = {
+                key: {"value": float(value), "std": float(spread)}
+                for key, value, spread, prior in sizes
+                if spread / prior > _SEEN
+            }
+            parameters |= {key: {"value": value} for key, value in block.shape.items()}
+            causes.append({"effect": block.family.name, "parameters": parameters})
+        return causes
+
+
+def fitted_sizes(recording: Recording, twin: Twin, effects: Sequence[Effect]) -> list[dict[str, Any]]:
+    """Return the causes of an answer: given effects with all their sizes fitted by one Gauss–Newton step.
+
+    Parameters
+    ----------
+    recording : Recording
+        With a tachometer.
+    twin : Twin
+        The simulation.
+    effects : sequence of Effect
+        What the recording is known to have, near its true sizes and shapes.
+    """
+    array, drive = twin.array, KnownDrive(recording, twin)
+    white = twin.expected_noise(recording.sample_rate).white
+    sizes = [(number, place, size) for number, one in enumerate(effects) for place, size in enumerate(one.sizes(array))]
+    begun, columns = drive.readings(*effects), []
+    for number, place, size in sizes:
+        values = effects[number].size_values(array)
+        values[place] += _NEAR * size.prior_std
+        moved = list(effects)
+        moved[number] = type(effects[number]).from_sizes(array, values, effects[number].shape_values())
+        columns.append(((drive.readings(*moved) - begun) / white).ravel() / _NEAR)
+    rest = np.nan_to_num((recording.for_array(array) - begun) / white).ravel()
+    design = np.column_stack(columns) if columns else np.zeros((rest.size, 0))
+    covariance = np.linalg.pinv(design.T @ design, rcond=_SINGULAR)
+    step, std = covariance @ (design.T @ rest), np.sqrt(np.diag(covariance))
+    causes: list[dict[str, Any]] = [
+        {"effect": one.name, "parameters": {key: {"value": value} for key, value in one.parameters.items()}}
+        for one in effects
+    ]
+    for column, (number, place, size) in enumerate(sizes):
+        value = effects[number].size_values(array)[place] + step[column] * size.prior_std
+        causes[number]["parameters"][size.key] = {"value": float(value), "std": float(std[column] * size.prior_std)}
+    return causes
+
+
+def _shapes(family: type[Effect], recording: Recording, residual: Floats) -> tuple[dict[str, float], ...]:
+    """Return the grid of a family; a tone is put at the highest line of the mean periodogram."""
+    if family.name != "interference_tone":
+        return family.shapes(recording.duration, recording.sample_rate)
+    power = np.mean(np.abs(np.fft.rfft(residual - residual.mean(axis=0), axis=0)) ** 2, axis=1)
+    line = int(np.argmax(power[1:])) + 1
+    return ({"frequency_hz": line * recording.sample_rate / len(residual)},)
