@@ -72,6 +72,7 @@ REFUSED = (
     refused("demo", "gfimu demo", "mujoco, rerun-sdk and matplotlib", "sim,view,plot"),
     refused("simulate paper_run --out no.csv", *MUJOCO),
     refused("tolerance cube12 --closed-form", *MUJOCO),
+    refused("benchmark list", "gfimu benchmark", "mujoco", "sim"),
     refused("firmware run --out no.csv", "gfimu firmware run", "unicorn and mujoco", "firmware,sim"),
     refused("convert cube12 no.xml", "no.xml: what is converted", "mujoco", "sim"),
     refused("convert run.csv no.mcap", "no.mcap: what is converted", "mcap and rosbags", "formats"),

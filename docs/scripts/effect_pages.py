@@ -75,7 +75,9 @@ def index_page(effects: Mapping[str, type[Effect]], numbers: Mapping[str, Any]) 
         mine = [effect for effect in effects.values() if place_of(effect) == place]
         if not mine:
             continue
-        rows = ["| effect | what is so in the world and missing in the simulation | formula | not separable in a sweep from |"]
+        rows = [
+            "| effect | what is so in the world and missing in the simulation | formula | not separable in a sweep from |"
+        ]
         rows.append("|---|---|---|---|")
         for effect in mine:
             sweep = numbers[effect.name]["motions"].get("speed sweep", {"rivals": []})
@@ -229,7 +231,9 @@ def _inline(text: Description) -> str:
     short = min(text.formula, key=len) if len(text.formula[-1]) > 48 else text.formula[-1]
     if len(short) > 48 or (short != text.formula[-1] and short.partition(" = ")[0] not in ("y", "n")):
         return ""
-    return f"${to_latex(short, vectors_of(text.formula, text.symbols))}$".replace("left|", "left\\vert ").replace("right|", "right\\vert ")
+    return f"${to_latex(short, vectors_of(text.formula, text.symbols))}$".replace("left|", "left\\vert ").replace(
+        "right|", "right\\vert "
+    )
 
 
 def _signature(effect: type[Effect], text: Description, found: Mapping[str, Any]) -> str:
@@ -242,9 +246,13 @@ def _signature(effect: type[Effect], text: Description, found: Mapping[str, Any]
         f"Largest rms: {in_words} {found['unit']}.",
     ]
     if found["share"] >= 0.5:
-        sentences.append(f"A function of the {found['against'].rpartition(',')[0]} explains {100 * found['share']:.0f} % of its variance.")
+        sentences.append(
+            f"A function of the {found['against'].rpartition(',')[0]} explains {100 * found['share']:.0f} % of its variance."
+        )
     if found["line_hz"] is not None:
-        sentences.append(f"Strongest line of {found['drawn'][0]}: {found['line']:g} {found['unit']} at {found['line_hz']:g} Hz.")
+        sentences.append(
+            f"Strongest line of {found['drawn'][0]}: {found['line']:g} {found['unit']} at {found['line_hz']:g} Hz."
+        )
     if found["drawn"] == ["reference"]:
         sentences.append("No channel changes, only the reference does.")
     if found["drawn"][0].startswith("gyro"):
@@ -269,7 +277,10 @@ def _rivals(numbers: Mapping[str, Any]) -> str:
         more = one.get("more") or []
         cell = ", ".join(rivals) + (f", and {len(more)} more" if more else "")
         rows.append(f"| {motion} | {one['detectability']:.3g} | {cell or 'none'} |")
-    return "\n".join(rows) + f"\n\nBold: not separable in this motion (below {SEPARATED:g} nats). Others explain nine tenths or more, but not all."
+    return (
+        "\n".join(rows)
+        + f"\n\nBold: not separable in this motion (below {SEPARATED:g} nats). Others explain nine tenths or more, but not all."
+    )
 
 
 def _rival(name: str, share: float, nats: float) -> str:
@@ -306,8 +317,10 @@ def _trial(effect: type[Effect], text: Description, found: Mapping[str, Any] | N
     twin = twin_of(effect.name)
     lines[0] += f"\ngfimu diagnose hidden.parquet --twin {twin} --out diagnosis\n```"
     if effect.name.startswith("gyro_"):
-        lines.append('The twin has to be that of a free body: a copy of `cube12_turntable` with `source = "gyro"` in `[drive]`.')
-    lines.append(f"In a twin file it is a table `[[effect]]` with `name = \"{effect.name}\"` and the same parameters.")
+        lines.append(
+            'The twin has to be that of a free body: a copy of `cube12_turntable` with `source = "gyro"` in `[drive]`.'
+        )
+    lines.append(f'In a twin file it is a table `[[effect]]` with `name = "{effect.name}"` and the same parameters.')
     if isinstance(effect, type) and issubclass(effect, Unlisted):
         dependence = effect.dependence.name
         lines.append(
@@ -331,7 +344,11 @@ def _verdict(found: Mapping[str, Any]) -> str:
         beside = f", not distinguishable from {_and([f'`{rival}`' for rival in rivals])}" if rivals else ""
         causes.append(f"`{name}` (probability {one['probability']:.2f}{beside})")
     by = f" by {_and(causes)}" if causes else ""
-    share = f"; {100 * found['share']:.0f} % of the excess on held-out data is removed" if found.get("share") is not None else ""
+    share = (
+        f"; {100 * found['share']:.0f} % of the excess on held-out data is removed"
+        if found.get("share") is not None
+        else ""
+    )
     return f"*{found['verdict'].replace('_', ' ')}*{by}{share}"
 
 

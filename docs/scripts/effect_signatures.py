@@ -199,7 +199,9 @@ def _of_gyro(run: Scenario, t: NDArray[np.float64], effect: Any) -> Signature:
     rms = {f"gyro {axis}": float(np.sqrt(np.mean(change[:, k] ** 2))) for k, axis in enumerate("xyz")}
     first = now[:, order[0]]
     eta = _explained(change[:, order[0]], first)
-    return Signature(run.name, t, names, "rad/s", change[:, order], rms, f"rate about {names[0][-1]}, rad/s", first, eta)
+    return Signature(
+        run.name, t, names, "rad/s", change[:, order], rms, f"rate about {names[0][-1]}, rad/s", first, eta
+    )
 
 
 def _quantities(
@@ -237,7 +239,10 @@ def _explained(change: NDArray[np.float64], values: NDArray[np.float64]) -> floa
         return 0.0
     edges = np.unique(np.round(np.quantile(values, np.linspace(0.0, 1.0, BINS + 1)[1:-1]), 9))
     place = np.searchsorted(edges, np.round(values, 9), side="left")
-    return 1.0 - sum(float(np.sum((one - one.mean()) ** 2)) for k in np.unique(place) for one in [change[place == k]]) / whole
+    return (
+        1.0
+        - sum(float(np.sum((one - one.mean()) ** 2)) for k in np.unique(place) for one in [change[place == k]]) / whole
+    )
 
 
 def draw(found: Signature, path: Path) -> None:

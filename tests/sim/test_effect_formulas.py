@@ -198,9 +198,7 @@ def at_other_times(names, formula, motion, world):
 
     def readings(times):
         times = np.broadcast_to(times, (len(T), ARRAY.n_channels))
-        return np.column_stack(
-            [forward.channels(world, motion, times[:, k])[:, k] for k in range(ARRAY.n_channels)]
-        )
+        return np.column_stack([forward.channels(world, motion, times[:, k])[:, k] for k in range(ARRAY.n_channels)])
 
     text = " ".join(formula)
     if "f(t" in text:
@@ -341,7 +339,9 @@ def rest(*effects):
 def test_the_formula_of_noise_holds_on_average():
     factor = describe(TABLE_EFFECTS["noise"]).example["factor"]
     plain, noisy = rest(), rest(f'{{name = "noise", parameters = {{factor = {factor}}}}}')
-    assert np.std(np.diff(noisy, axis=0)) / np.std(np.diff(plain, axis=0)) == pytest.approx(factor, rel=BY_CHANCE["noise"])
+    assert np.std(np.diff(noisy, axis=0)) / np.std(np.diff(plain, axis=0)) == pytest.approx(
+        factor, rel=BY_CHANCE["noise"]
+    )
 
 
 def test_the_formula_of_a_random_walk_holds_on_average():
