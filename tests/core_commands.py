@@ -1,4 +1,4 @@
-"""Walk through gfimu's commands where only its core is installed: those that work, and those that are refused.
+"""Call gfimu's commands where only its core is installed: those that work, and those that are refused.
 
     python tests/core_commands.py            in an environment with the core alone (`tests/matrix.py light` makes one)
     python tests/core_commands.py --block    in any environment: imports of all optional packages fail
@@ -72,6 +72,7 @@ REFUSED = (
     refused("demo", "gfimu demo", "mujoco, rerun-sdk and matplotlib", "sim,view,plot"),
     refused("simulate paper_run --out no.csv", *MUJOCO),
     refused("tolerance cube12 --closed-form", *MUJOCO),
+    refused("benchmark list", "gfimu benchmark", "mujoco", "sim"),
     refused("firmware run --out no.csv", "gfimu firmware run", "unicorn and mujoco", "firmware,sim"),
     refused("convert cube12 no.xml", "no.xml: what is converted", "mujoco", "sim"),
     refused("convert run.csv no.mcap", "no.mcap: what is converted", "mcap and rosbags", "formats"),
@@ -154,7 +155,7 @@ def wrong_calls(calls: Sequence[Call]) -> list[str]:
 
 
 def main() -> None:
-    """Walk in a folder that is made and removed."""
+    """Make the calls in a folder that is removed."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--block", action="store_true", help="let imports of all optional packages fail")
     options.add_argument("--part", choices=("all", "refused"), default="all", help="which calls")
