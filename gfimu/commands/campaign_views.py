@@ -143,7 +143,7 @@ def campaign_table(folder: str | Path, *, by: Sequence[str] = (), csv: str | Pat
     return found
 
 
-@writes(reads=("folder",), out=OutputFile("a picture", (".png", ".svg", ".html")))
+@writes(reads=("folder",), out=OutputFile("a picture", (".png", ".svg", ".html"), any_case=True))
 def campaign_plot(folder: str | Path, *, out: str | Path, result: Sequence[str] = ()) -> list[str]:
     """Draw results against each factor, and which factors cause their variance; return the names of what is drawn.
 

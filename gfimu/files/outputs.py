@@ -61,14 +61,17 @@ class OutputFile:
         What the file is, for messages.
     suffixes : tuple of str
         File name extensions that its writer supports.
+    any_case : bool
+        Whether capital letters in the extension are as good.
     """
 
     what: str
     suffixes: tuple[str, ...]
+    any_case: bool = False
 
     def check_suffix(self, path: Path) -> None:
         """Raise `InputError` for an extension that the writer does not support."""
-        if path.suffix in self.suffixes:
+        if (path.suffix.lower() if self.any_case else path.suffix) in self.suffixes:
             return
         if len(self.suffixes) == 1:
             raise InputError(f"{path}: {self.what} ends in {self.suffixes[0]}; name it so")
@@ -115,7 +118,7 @@ SCENARIO = OutputFile("a scenario file", (".toml",))
 TOML_FILE = OutputFile("a TOML file", (".toml",))
 KALIBR = OutputFile("a Kalibr file", (".yaml", ".yml"))
 JSON_SCHEMA = OutputFile("a JSON schema", (".json",))
-PICTURE = OutputFile("a picture", (".png", ".svg", ".pdf"))
+PICTURE = OutputFile("a picture", (".png", ".svg", ".pdf"), any_case=True)
 
 
 def check_parent(path: Path) -> None:
