@@ -23,7 +23,7 @@ from firmware_bridge.adxl345.device import Adxl345
 from firmware_bridge.adxl345.registers import TICKS_PER_SECOND, Adxl345Options, LineFault
 from firmware_bridge.loop.physics import Conversions, RestPhysics
 from firmware_bridge.lpc1768.build import IMAGES, image_path
-from gfimu.errors import GfimuError, InputError
+from gfimu.errors import GfimuError, InputError, did_you_mean
 
 __all__ = ["BoardProcess", "emulator_available", "require_emulator"]
 
@@ -81,7 +81,10 @@ class BoardProcess:
         require_emulator()
         path = image_path(str(image)) if str(image) in IMAGES else Path(image)
         if not path.is_file():
-            raise InputError(f"{image}: no such image; valid: {', '.join(IMAGES)}, or the path of an ELF file")
+            raise InputError(
+                f"{image}: no such image; valid: {', '.join(IMAGES)}, or the path of an ELF file"
+                f"{did_you_mean(str(image), IMAGES)}"
+            )
         compiled = importlib.util.find_spec("ziglang") is not None
         self.fast = (compiled if fast is None else fast) and not trace and not lose_every
         self._conversions = conversions or RestPhysics()

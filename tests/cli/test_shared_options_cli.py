@@ -24,7 +24,17 @@ OF_ITS_OWN = {
 }
 """Options whose name several commands use, each for a thing of its own; None: all of them."""
 
-SAME_DEFAULT = ("--axis", "--axis-point", "--force", "--hub", "--image", "--inclination-rad", "--json", "--map", "--rrd")
+SAME_DEFAULT = (
+    "--axis",
+    "--axis-point",
+    "--force",
+    "--hub",
+    "--image",
+    "--inclination-rad",
+    "--json",
+    "--map",
+    "--rrd",
+)
 
 UNITS = re.compile(
     r"(, |: |× )(m|s|rad|Hz|mg|g|kHz|degrees|°|K|mm|%|m/s²|rad/s|rad/s²|°/h|µg/√Hz|µg/√s|m/s²/√s|m/s²/√Hz|rad²/s⁵|s²/rad²|"
@@ -113,7 +123,13 @@ def test_a_number_says_its_unit(words, param):
 def test_descriptions_are_sentences(words):
     for param in COMMANDS[words].params:
         if param.param_type_name == "option" and not param.hidden and "--help" not in param.opts:
-            assert param.help[0].isupper() or param.help.split()[0].rstrip(":,") in {"none", "array", "spin", "gyro", "pty"}
+            assert param.help[0].isupper() or param.help.split()[0].rstrip(":,") in {
+                "none",
+                "array",
+                "spin",
+                "gyro",
+                "pty",
+            }
             assert param.help.rstrip().endswith((".", "?")), param.help
 
 
