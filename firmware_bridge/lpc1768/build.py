@@ -96,9 +96,8 @@ class BuildReport:
 def image_path(name: str = "gfimu") -> Path:
     """Path of a committed image; raises `InputError` that lists the images."""
     if name not in IMAGES:
-        raise InputError(
-            f"unknown image {name!r}; valid: {', '.join(IMAGES)}, or the path of an ELF file{did_you_mean(name, IMAGES)}"
-        )
+        remedy = did_you_mean(name, IMAGES)
+        raise InputError(f"unknown image {name!r}; valid: {', '.join(IMAGES)}, or the path of an ELF file{remedy}")
     return FOLDER / "image" / f"{name}.elf"
 
 

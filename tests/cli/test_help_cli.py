@@ -36,8 +36,10 @@ CHEAP = (
     "gfimu schema estimate",
     "gfimu schema campaign table --out table.schema.json",
     "gfimu score cube12 p3_three_plus_one --speed-rad-s 10",
-    "gfimu score one_chip --axis z --axis-point -0.1 0 0 --lever-std-m 0.003 --rotation-std-rad 0.05 "
-    "--bias-std-m-s2 0.2",
+    (
+        "gfimu score one_chip --axis z --axis-point -0.1 0 0 --lever-std-m 0.003 --rotation-std-rad 0.05 "
+        "--bias-std-m-s2 0.2"
+    ),
     "gfimu drift --from-position 6.42 0 0 --known-bias-mg 1 0 0 --latitude 35.7",
     "gfimu simulate paper_run --out run.csv --set sensor.range_g=8 --set duration_s=5",
     "gfimu tolerance cube12 --closed-form --part adxl355 --calibrated poses+rest",

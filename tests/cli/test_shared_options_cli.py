@@ -36,11 +36,12 @@ SAME_DEFAULT = (
     "--rrd",
 )
 
-UNITS = re.compile(
-    r"(, |: |× )(m|s|rad|Hz|mg|g|kHz|degrees|°|K|mm|%|m/s²|rad/s|rad/s²|°/h|µg/√Hz|µg/√s|m/s²/√s|m/s²/√Hz|rad²/s⁵|s²/rad²|"
-    r"bits per second|a ratio|reading unit squared|±2, 4, 8 or 16 g)(?=\W|$)|ratio|frequency class|[Nn]umber|How many|Longest|m/s² per count|"
-    r"by default|Most|Range"
+WRITTEN = (
+    "m|s|rad|Hz|mg|g|kHz|degrees|°|K|mm|%|m/s²|rad/s|rad/s²|°/h|µg/√Hz|µg/√s|m/s²/√s|m/s²/√Hz|rad²/s⁵|s²/rad²|"
+    "bits per second|a ratio|reading unit squared|±2, 4, 8 or 16 g"
 )
+NO_UNIT = "ratio|frequency class|[Nn]umber|How many|Longest|m/s² per count|by default|Most|Range"
+UNITS = re.compile(rf"(, |: |× )({WRITTEN})(?=\W|$)|{NO_UNIT}")
 
 
 def commands():

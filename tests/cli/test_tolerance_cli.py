@@ -62,7 +62,15 @@ def test_json_is_the_result_of_the_function(gfimu_command):
 
 def test_a_scenario_and_another_part(gfimu_command):
     result = gfimu_command(
-        "tolerance", "cube12", "--closed-form", "--scenario", "paper_run", "--duration", 8, "--part", "adxl355",
+        "tolerance",
+        "cube12",
+        "--closed-form",
+        "--scenario",
+        "paper_run",
+        "--duration",
+        8,
+        "--part",
+        "adxl355",
         "--json",
     )
     data = json.loads(result.stdout)
