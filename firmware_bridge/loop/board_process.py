@@ -240,6 +240,7 @@ def _work(
     array: str,
 ) -> None:
     """Serve one board until the pipe closes."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the first process that is started has it unblocked again
     import numpy as np
 
     from firmware_bridge.board.worker import Worker
