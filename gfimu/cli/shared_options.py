@@ -90,7 +90,7 @@ SHARED: dict[str, Shared] = {
         "Image: gfimu, selfcheck, or an ELF or .bin file.", "IMAGE", complete=completion.words("gfimu", "selfcheck")
     ),
     "--inclination-rad": Shared(
-        "Angle between --axis and the vertical; else from the data, or 0 (a free hub: π/2) where there are none.",
+        "Angle between --axis and the vertical, rad; else from the data, or 0 (a free hub: π/2) where there are none.",
         "RAD",
         KNOWN_AXIS,
     ),
