@@ -111,7 +111,7 @@ class CampaignTable(PlottedResult):
         }
 
 
-_PICTURE = OutputFile("a picture", (".png", ".svg", ".html"), dict.fromkeys((".png", ".svg", ".html"), ("matplotlib",)))
+_PICTURE = OutputFile("a picture", (".png", ".svg", ".html"), dict.fromkeys((".png", ".svg", ".html"), ("matplotlib",)), any_case=True)
 
 
 def group_columns(groups: Sequence[Group]) -> dict[str, NDArray[Any]]:
