@@ -175,7 +175,7 @@ def _print(found: Any) -> None:
         columns = [one.row()[1:] for one in found.summaries if one.set_name == name]
         first, *rows = zip(COLUMNS[1:], *columns, strict=True)
         print_table(name, first, rows)
-    print_text("points: right 1, tied, in part or in a set of k 1/2 or 1/k, unknown 0.25, missed 0, wrong name or false alarm -1")
+    print_text("points: right 1, in part or in a set 0.5 or less, unknown 0.25, missed 0, wrong name or false alarm -1")
 
 
 def _shown(title: str, show: Any) -> Callable[[int, int], None]:
