@@ -1,4 +1,4 @@
-"""How many faulty channels are found, and how many sound ones are excluded: the table of docs/integrity.md.
+"""How many faulty channels are found, and how many sound ones are excluded: the table of docs/theory/integrity.md.
 
 Run ``PYTHONPATH=tests/gfimu/integrity python benchmarks/channel_faults.py`` (10 min of processor time). The readings
 are those of the tests (`watched_world`): ``cube12``, noise of the data sheet, gains 0.05 %, axes 0.5 mrad, places

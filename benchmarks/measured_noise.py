@@ -1,4 +1,4 @@
-"""Errors, their standard deviations and signs on a real board against its gyros: the table of docs/rate.md.
+"""Errors, their standard deviations and signs on a real board against its gyros: the table of docs/theory/rate.md.
 
 Run ``python benchmarks/measured_noise.py FOLDER`` with the folder of the MIMU4444 recordings ``exp_1.bin.gz`` and
 ``exp_2.bin.gz`` (Carlsson, Skog & Jaldén, IEEE Sensors J. 21, 2021). Both are calibrated on the first. The gyros are

@@ -31,17 +31,23 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     # What type checkers and editors see; at run time names load on first use (`_PUBLIC`).
+    from gfimu.array_search.front import Front as Front
+    from gfimu.array_search.search import SearchResult as SearchResult
     from gfimu.bounds.posterior import posterior_rate_bound as posterior_rate_bound
     from gfimu.bounds.sample import rate_bound as rate_bound
     from gfimu.calibration.array_calibration import calibrate_array as calibrate_array
     from gfimu.calibration.array_calibration import update_array_calibration as update_array_calibration
     from gfimu.calibration.result import Calibration as Calibration
     from gfimu.calibration.result import load_calibration as load_calibration
+    from gfimu.certification.certificate import Certificate as Certificate
     from gfimu.commands import benchmark as benchmark
     from gfimu.commands import firmware as firmware
     from gfimu.commands.benchmark import benchmark_list as benchmark_list
     from gfimu.commands.calibrate import calibrate as calibrate
+    from gfimu.commands.campaign import CampaignResult as CampaignResult
     from gfimu.commands.campaign import campaign as campaign
+    from gfimu.commands.campaign_views import CampaignStatus as CampaignStatus
+    from gfimu.commands.campaign_views import CampaignTable as CampaignTable
     from gfimu.commands.campaign_views import campaign_plot as campaign_plot
     from gfimu.commands.campaign_views import campaign_status as campaign_status
     from gfimu.commands.campaign_views import campaign_table as campaign_table
@@ -51,9 +57,13 @@ if TYPE_CHECKING:
     from gfimu.commands.certificate import certificate as certificate
     from gfimu.commands.check import check as check
     from gfimu.commands.convert import convert as convert
+    from gfimu.commands.demo import DemoResult as DemoResult
     from gfimu.commands.demo import demo as demo
     from gfimu.commands.design import design as design
     from gfimu.commands.diagnose import diagnose as diagnose
+    from gfimu.commands.diagnose import write_report as write_report
+    from gfimu.commands.drift import Drift as Drift
+    from gfimu.commands.drift import EquivalentErrors as EquivalentErrors
     from gfimu.commands.drift import axis_drift as axis_drift
     from gfimu.commands.drift import drift as drift
     from gfimu.commands.drift import drift_from_position as drift_from_position
@@ -66,13 +76,24 @@ if TYPE_CHECKING:
     from gfimu.commands.noise import noise as noise
     from gfimu.commands.optimize import optimize as optimize
     from gfimu.commands.record import record as record
+    from gfimu.commands.schema import schema as schema
+    from gfimu.commands.score import Scores as Scores
     from gfimu.commands.score import score as score
     from gfimu.commands.simulate import simulate as simulate
+    from gfimu.commands.tolerance import ToleranceResult as ToleranceResult
     from gfimu.commands.tolerance import tolerance as tolerance
     from gfimu.commands.view import view as view
+    from gfimu.crash.event import Impact as Impact
+    from gfimu.diagnosis.design.proposal import Proposal as Proposal
+    from gfimu.diagnosis.design.run_check import RunCheck as RunCheck
+    from gfimu.diagnosis.verdict.verdict import Diagnosis as Diagnosis
+    from gfimu.diagnosis.verdict.verdict import NamedCause as NamedCause
+    from gfimu.errors import CorruptValueWarning as CorruptValueWarning
     from gfimu.errors import GeometryError as GeometryError
     from gfimu.errors import GfimuError as GfimuError
     from gfimu.errors import InputError as InputError
+    from gfimu.errors import RecordingWarning as RecordingWarning
+    from gfimu.errors import UnitError as UnitError
     from gfimu.geometry.array import AccelerometerArray as AccelerometerArray
     from gfimu.geometry.array import Chip as Chip
     from gfimu.geometry.dilution import gdop as gdop
@@ -83,6 +104,13 @@ if TYPE_CHECKING:
     from gfimu.geometry.kinematics import null_space as null_space
     from gfimu.geometry.kinematics import pseudo_inverse as pseudo_inverse
     from gfimu.geometry.kinematics import specific_force as specific_force
+    from gfimu.geometry.scoring import Score as Score
+    from gfimu.geometry.turning_axis import TurningAxis as TurningAxis
+    from gfimu.importing.column_map import ColumnMap as ColumnMap
+    from gfimu.importing.inspection import Inspection as Inspection
+    from gfimu.joining.join import Joined as Joined
+    from gfimu.known_axis.accuracy.bounds import AxisBounds as AxisBounds
+    from gfimu.known_axis.accuracy.drift import AxisDrift as AxisDrift
     from gfimu.motion.attitude import integrate_attitude as integrate_attitude
     from gfimu.motion.earth import EarthRotation as EarthRotation
     from gfimu.motion.equivalent_errors import equivalent_p_bias as equivalent_p_bias
@@ -94,8 +122,11 @@ if TYPE_CHECKING:
     from gfimu.motion.navigation import navigate as navigate
     from gfimu.motion.rest_bias import estimate_from_rest as estimate_from_rest
     from gfimu.position_drift import drift_budget as drift_budget
+    from gfimu.position_drift.budget import DriftBudget as DriftBudget
     from gfimu.position_drift.closed_forms import ErrorSources as ErrorSources
+    from gfimu.position_drift.monte_carlo import DriftSample as DriftSample
     from gfimu.position_drift.monte_carlo import monte_carlo_drift as monte_carlo_drift
+    from gfimu.position_drift.rest_windows import RestDrift as RestDrift
     from gfimu.rate.integration import integrate_rate as integrate_rate
     from gfimu.rate.live import LiveRateFilter as LiveRateFilter
     from gfimu.rate.methods import estimate_rate as estimate_rate
@@ -103,14 +134,55 @@ if TYPE_CHECKING:
     from gfimu.rate.sensing import SensorErrors as SensorErrors
     from gfimu.recording import Recording as Recording
     from gfimu.recording.formats import open_recording as open_recording
+    from gfimu.recording.mapped import MappedFile as MappedFile
     from gfimu.recording.mimu4444 import read_mimu4444 as read_mimu4444
     from gfimu.sensor_noise import allan_deviation as allan_deviation
     from gfimu.sensor_noise import identify_noise as identify_noise
-    from gfimu.sensor_noise import recording_noise as recording_noise
+    from gfimu.sensor_noise.allan import AllanDeviation as AllanDeviation
+    from gfimu.sensor_noise.identification import NoiseModel as NoiseModel
+    from gfimu.sensor_noise.recording_noise import RecordingNoise as RecordingNoise
+    from gfimu.sensor_noise.recording_noise import recording_noise as recording_noise
+    from sim.scenarios import Scenario as Scenario
+    from sim.twin import Twin as Twin
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _PUBLIC = {
+    "Score": "gfimu.geometry.scoring",
+    "Scores": "gfimu.commands.score",
+    "AxisBounds": "gfimu.known_axis.accuracy.bounds",
+    "Diagnosis": "gfimu.diagnosis.verdict.verdict",
+    "NamedCause": "gfimu.diagnosis.verdict.verdict",
+    "RecordingNoise": "gfimu.sensor_noise.recording_noise",
+    "NoiseModel": "gfimu.sensor_noise.identification",
+    "AllanDeviation": "gfimu.sensor_noise.allan",
+    "Drift": "gfimu.commands.drift",
+    "DriftBudget": "gfimu.position_drift.budget",
+    "DriftSample": "gfimu.position_drift.monte_carlo",
+    "AxisDrift": "gfimu.known_axis.accuracy.drift",
+    "RestDrift": "gfimu.position_drift.rest_windows",
+    "EquivalentErrors": "gfimu.commands.drift",
+    "ToleranceResult": "gfimu.commands.tolerance",
+    "CampaignResult": "gfimu.commands.campaign",
+    "CampaignStatus": "gfimu.commands.campaign_views",
+    "CampaignTable": "gfimu.commands.campaign_views",
+    "SearchResult": "gfimu.array_search.search",
+    "Front": "gfimu.array_search.front",
+    "RunCheck": "gfimu.diagnosis.design.run_check",
+    "Proposal": "gfimu.diagnosis.design.proposal",
+    "Inspection": "gfimu.importing.inspection",
+    "Joined": "gfimu.joining.join",
+    "Impact": "gfimu.crash.event",
+    "Certificate": "gfimu.certification.certificate",
+    "DemoResult": "gfimu.commands.demo",
+    "Scenario": "sim.scenarios",
+    "Twin": "sim.twin",
+    "TurningAxis": "gfimu.geometry.turning_axis",
+    "ColumnMap": "gfimu.importing.column_map",
+    "MappedFile": "gfimu.recording.mapped",
+    "UnitError": "gfimu.errors",
+    "RecordingWarning": "gfimu.errors",
+    "CorruptValueWarning": "gfimu.errors",
     "AccelerometerArray": "gfimu.geometry.array",
     "EarthRotation": "gfimu.motion.earth",
     "Calibration": "gfimu.calibration.result",
@@ -178,7 +250,8 @@ _PUBLIC = {
     "rate_bound": "gfimu.bounds.sample",
     "read_mimu4444": "gfimu.recording.mimu4444",
     "record": "gfimu.commands.record",
-    "recording_noise": "gfimu.sensor_noise",
+    "recording_noise": "gfimu.sensor_noise.recording_noise",
+    "schema": "gfimu.commands.schema",
     "score": "gfimu.commands.score",
     "show": "gfimu.commands.catalogue",
     "simulate": "gfimu.commands.simulate",
@@ -187,6 +260,7 @@ _PUBLIC = {
     "tolerance": "gfimu.commands.tolerance",
     "update_array_calibration": "gfimu.calibration.array_calibration",
     "view": "gfimu.commands.view",
+    "write_report": "gfimu.commands.diagnose",
 }
 """Public names and the modules that hold them."""
 

@@ -12,11 +12,15 @@ __all__ = [
     "CorruptValueWarning",
     "GeometryError",
     "GfimuError",
+    "GfimuWarning",
     "InputError",
+    "MissingPackageError",
+    "OmittedFileWarning",
     "RecordingWarning",
     "UnitError",
     "WriteError",
     "naming",
+    "nearest_name",
     "unknown_name",
 ]
 
@@ -40,6 +44,10 @@ class InputError(GfimuError, ValueError):
     """A file or value that can't be used as given; commands end with exit code 2."""
 
 
+class MissingPackageError(InputError, ImportError):
+    """A package that gfimu runs without is needed and not installed; the message holds the command to install it."""
+
+
 class WriteError(GfimuError, OSError):
     """A file that could not be written, on a full disk say; what stood in its place is as it was."""
 
@@ -57,8 +65,16 @@ class GeometryError(InputError):
     """A sensor geometry that can't see the motions asked for."""
 
 
-class RecordingWarning(UserWarning):
-    """Something about a recording that a user should know, though it can be used; commands print it as one line."""
+class GfimuWarning(UserWarning):
+    """Something that a user should know, though the work goes on; commands print it as one line."""
+
+
+class OmittedFileWarning(GfimuWarning):
+    """A file of a result is not written, as a package is not installed; the message holds the command to install it."""
+
+
+class RecordingWarning(GfimuWarning):
+    """Something about a recording that a user should know, though it can be used."""
 
 
 class CorruptValueWarning(RecordingWarning):
@@ -79,6 +95,20 @@ def naming(source: str) -> Iterator[None]:
 def unknown_name(kind: str, name: str, valid: Iterable[str]) -> InputError:
     """Build the error for a name that is not in a list, with the list and the nearest name."""
     names = sorted(valid)
-    near = difflib.get_close_matches(name, names, 1, _ALIKE)
-    remedy = f"; did you mean {near[0]!r}?" if near else ""
+    near = nearest_name(name, names)
+    remedy = f"; did you mean {near!r}?" if near else ""
     return InputError(f"unknown {kind} {name!r}; valid: {', '.join(names)}{remedy}")
+
+
+def nearest_name(name: str, valid: Iterable[str], alike: float = _ALIKE) -> str | None:
+    """Return the name of a list that a wrong one was probably meant to be; None where none is near.
+
+    Case, and a dash for an underscore, count for nothing. Names are near from a ratio ``alike`` of `difflib` on.
+    """
+
+    def plainly(text: str) -> str:
+        return text.casefold().replace("-", "_")
+
+    meant = {plainly(one): one for one in valid}
+    near = difflib.get_close_matches(plainly(name), meant, 1, alike)
+    return meant[near[0]] if near else None

@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any
+
+from gfimu.optional_packages import require
 
 __all__ = ["names_on_first_use"]
 
 
-def names_on_first_use(package: str, homes: Mapping[str, str]) -> Callable[[str], Any]:
+def names_on_first_use(
+    package: str,
+    homes: Mapping[str, str],
+    *,
+    needs: tuple[str, str] | None = None,
+    without: Collection[str] = (),
+) -> Callable[[str], Any]:
     """Return the ``__getattr__`` of a package whose names stand in its modules.
 
     Parameters
@@ -18,11 +26,17 @@ def names_on_first_use(package: str, homes: Mapping[str, str]) -> Callable[[str]
         Name of the package.
     homes : mapping of str to str
         Module inside the package by the name that it holds.
+    needs : tuple of str, optional
+        What the names are for, and the optional package that they need (`gfimu.optional_packages.require`).
+    without : collection of str
+        Names that do without that package.
     """
 
     def load(name: str) -> Any:
         if name not in homes:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
+        if needs is not None and name not in without:
+            require(*needs)
         return getattr(importlib.import_module(f"{package}.{homes[name]}"), name)
 
     return load

@@ -119,7 +119,7 @@ class Scenario:
 
     @property
     def place(self) -> dict[str, float]:
-        """Metadata of a recording that say where it was made: gravity where it isn't standard, latitude and north."""
+        """Metadata of a recording that say where it was made, gravity where it isn't standard, latitude and north."""
         if self.earth is None:
             return {} if self.gravity == STANDARD_GRAVITY else {"gravity_m_s2": self.gravity}
         return {**self.earth.to_dict(), "gravity_m_s2": self.gravity}

@@ -12,7 +12,7 @@ from sim.sweep.plan import load_plan
 
 @pytest.fixture(scope="module")
 def page(project_root):
-    return (project_root / "docs" / "campaign.md").read_text(encoding="utf-8")
+    return (project_root / "docs" / "how_to" / "campaign.md").read_text(encoding="utf-8")
 
 
 def test_the_plans_of_the_page_are_plans(page, tmp_path):
@@ -29,7 +29,7 @@ def test_the_plans_of_the_page_are_plans(page, tmp_path):
 
 
 def test_the_figure_of_the_page_is_there_and_small(page, project_root):
-    (name,) = re.findall(r"\(figures/(\S+?)\)", page)
+    (name,) = re.findall(r"\(\.\./figures/(\S+?)\)", page)
     picture = (project_root / "docs" / "figures" / name).read_bytes()
     assert len(picture) < 150_000
     assert struct.unpack(">II", picture[16:24])[0] > 1200

@@ -12,7 +12,9 @@ import pytest
 
 @pytest.fixture(scope="module")
 def script(project_root):
-    specification = importlib.util.spec_from_file_location("make_figures", project_root / "docs" / "make_figures.py")
+    specification = importlib.util.spec_from_file_location(
+        "make_figures", project_root / "docs" / "scripts" / "make_figures.py"
+    )
     module = importlib.util.module_from_spec(specification)
     sys.modules[specification.name] = module  # dataclasses look their module up
     specification.loader.exec_module(module)
@@ -41,8 +43,8 @@ def test_every_figure_is_drawn_small_and_not_empty(drawn):
 def test_the_pages_show_exactly_these_figures(drawn, project_root):
     names = {path.name for path in drawn}
     shown = set()
-    for page in ("paper_experiment.md", "drift.md"):
-        shown |= set(re.findall(r"\(figures/(\S+?)\)", (project_root / "docs" / page).read_text()))
+    for page in ("cases/paper_experiment.md", "theory/drift.md"):
+        shown |= set(re.findall(r"\(\.\./figures/(\S+?)\)", (project_root / "docs" / page).read_text()))
     assert shown == names
     for path in drawn:  # the stored ones are of the same size: nobody forgot to draw them again after a change
         stored = project_root / "docs" / "figures" / path.name

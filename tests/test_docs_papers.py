@@ -13,7 +13,7 @@ ROW_CELLS = 6  # item, as printed, as derived, as run, agreement, difference
 
 @pytest.fixture(scope="module")
 def page(project_root):
-    return (project_root / "docs" / "papers.md").read_text(encoding="utf-8")
+    return (project_root / "docs" / "theory" / "papers.md").read_text(encoding="utf-8")
 
 
 @pytest.fixture(scope="module")
@@ -76,6 +76,37 @@ def test_what_is_not_there_is_seen(reference, tests_by_name, project_root):
 def test_no_shipped_file_calls_itself_the_printed_matrix(project_root):
     """The printed J has one column twice; the arrays are the derived one."""
     shipped = [*(project_root / "models").rglob("*.toml"), *(project_root / "gfimu").rglob("*.py")]
-    pages = [page for page in (project_root / "docs").glob("*.md") if page.name not in {"papers.md", "geometry.md"}]
+    pages = [page for page in (project_root / "docs").rglob("*.md") if page.name not in {"papers.md", "geometry.md"}]
     for file in [*shipped, *pages, project_root / "README.md"]:
         assert not re.search(r"printed J\b|matrix printed", file.read_text(encoding="utf-8")), file.name
+
+
+CITED = re.compile(
+    r"(?:(GF-IMU|Persian) (?:calibration )?)?paper[^.;\n]{0,40}?\beqs?\.? (\d+)(?:[-–](\d+))?|(?<![\w-])eqs (28)[-–](29)"
+)
+
+
+def numbers(text):
+    """Numbers of equations that a text names, ranges filled in."""
+    return {
+        number
+        for first, last in re.findall(r"\beqs?\.? (\d+)(?:[-–](\d+))?", text)
+        for number in range(int(first), int(last or first) + 1)
+    }
+
+
+def test_equations_that_the_code_cites_are_in_the_theory(page, project_root):
+    """A number that a comment cites leads to a row of the papers, or to a derivation."""
+    theory = project_root / "docs" / "theory"
+    sections = {name: page.split(f"## {name} paper")[1].split("\n## ")[0] for name in ("GF-IMU", "Persian")}
+    derived = "".join((theory / name).read_text(encoding="utf-8") for name in ("geometry.md", "drift.md"))
+    known = {"GF-IMU": numbers(sections["GF-IMU"]) | numbers(derived), "Persian": numbers(sections["Persian"])}
+    cited = [
+        (match[1] or "GF-IMU", number, file.name)
+        for folder in ("gfimu", "sim", "firmware_bridge")
+        for file in (project_root / folder).rglob("*.py")
+        for match in CITED.finditer(file.read_text(encoding="utf-8"))
+        for number in numbers(match[0])
+    ]
+    assert {number for paper, number, _ in cited if paper == "GF-IMU"} >= {2, 22, 28, 29, 30}
+    assert not [where for where in cited if where[1] not in known[where[0]]]

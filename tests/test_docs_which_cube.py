@@ -15,7 +15,7 @@ EDGES = {"cube50": 0.05, "cube12": 0.1, "cube200": 0.2}
 
 @pytest.fixture(scope="module")
 def page(project_root):
-    return (project_root / "docs" / "which_cube.md").read_text(encoding="utf-8")
+    return (project_root / "docs" / "cases" / "which_cube.md").read_text(encoding="utf-8")
 
 
 @pytest.fixture(scope="module")

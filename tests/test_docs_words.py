@@ -17,7 +17,7 @@ OUTSIDE = {"diagnosis-study.md"}  # names the runs of the stored study, which ar
 
 
 def pages(root):
-    return [root / "README.md", *(page for page in sorted((root / "docs").glob("*.md")) if page.name not in OUTSIDE)]
+    return [root / "README.md", *(page for page in sorted((root / "docs").rglob("*.md")) if page.name not in OUTSIDE)]
 
 
 def test_the_pages_use_exact_words(project_root):
@@ -32,7 +32,7 @@ def test_the_pages_use_exact_words(project_root):
 
 @pytest.fixture(scope="module")
 def glossary(project_root):
-    return (project_root / "docs" / "glossary.md").read_text(encoding="utf-8")
+    return (project_root / "docs" / "reference" / "glossary.md").read_text(encoding="utf-8")
 
 
 def test_each_term_names_a_standard_of_the_list(glossary):

@@ -1,4 +1,4 @@
-"""The script that draws the figures of docs/rate.md."""
+"""The script that draws the figures of docs/theory/rate.md."""
 
 import importlib.util
 import sys
@@ -10,7 +10,7 @@ import pytest
 
 @pytest.fixture(scope="module")
 def script(project_root):
-    path = project_root / "docs" / "make_rate_figures.py"
+    path = project_root / "docs" / "scripts" / "make_rate_figures.py"
     specification = importlib.util.spec_from_file_location("make_rate_figures", path)
     module = importlib.util.module_from_spec(specification)
     sys.modules[specification.name] = module

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from firmware_bridge.board.bus import Bus, Tracer
 from firmware_bridge.board.faults import BoardFault, FaultKind
 from firmware_bridge.board.nvic import SVCALL, UNMASKABLE, Nvic
-from gfimu.errors import InputError
+from gfimu.optional_packages import require
 
 if TYPE_CHECKING:
     from firmware_bridge.lpc1768.elf import ElfImage
@@ -60,7 +60,7 @@ _INTERRUPT_HOOK = ctypes.CFUNCTYPE(None, _UNUSED, ctypes.c_uint32)
 def require_unicorn() -> None:
     """Raise `InputError` that says what to install when the emulator is missing."""
     if unicorn is None:
-        raise InputError("the board needs the emulator unicorn, which is not installed; pip install 'gfimu[firmware]'")
+        require("the emulated board", "unicorn")
 
 
 def unicorn_parts() -> tuple[Any, Any, Any]:

@@ -1,4 +1,4 @@
-"""Commands to the firmware, its replies and its identity (docs/frames.md)."""
+"""Commands to the firmware, its replies and its identity (docs/reference/frames.md)."""
 
 from __future__ import annotations
 
@@ -203,7 +203,7 @@ class Dialogue:
 
 
 def encode_command(command: int, *values: int) -> bytes:
-    """Encode a command with its values (docs/frames.md)."""
+    """Encode a command with its values (docs/reference/frames.md)."""
     try:
         payload = struct.pack(_PAYLOADS.get(command, "<"), *values)
     except struct.error:

@@ -1,6 +1,7 @@
 """From bytes to samples: a stream in one of the frame formats, with unwrapped time and what is missing in it.
 
-`SampleDecoder` turns a byte stream in one of the formats (`firmware_bridge.frames.frame_format`, docs/frames.md) into
+`SampleDecoder` turns a byte stream in one of the formats (`firmware_bridge.frames.frame_format`,
+docs/reference/frames.md) into
 samples with unwrapped time, the number of samples lost before each, and a segment number that changes whenever the
 board has started anew.
 """

@@ -1,4 +1,4 @@
-"""A frame format as a TOML file: a binary packet or a line of text, described without code (docs/frames.md)."""
+"""A frame format as a TOML file: a binary packet or a line of text, without code (docs/reference/frames.md)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a frame is: status bits, packet layouts and their fields, and the formats that are built in (docs/frames.md)."""
+"""What a frame is: status bits, packet layouts, their fields and the built-in formats (docs/reference/frames.md)."""
 
 from __future__ import annotations
 

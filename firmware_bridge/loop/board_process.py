@@ -6,8 +6,8 @@ with the caller and is asked for in batches.
 
 from __future__ import annotations
 
-import importlib.util
 import multiprocessing
+import signal
 import sys
 import threading
 from array import array
@@ -23,21 +23,19 @@ from firmware_bridge.adxl345.registers import TICKS_PER_SECOND, Adxl345Options, 
 from firmware_bridge.loop.physics import Conversions, RestPhysics
 from firmware_bridge.lpc1768.build import IMAGES, image_path
 from gfimu.errors import GfimuError, InputError
+from gfimu.optional_packages import missing, require
 
 __all__ = ["BoardProcess", "emulator_available", "require_emulator"]
-
-_NEEDED = "the emulated board needs unicorn, which is not installed; pip install 'gfimu[firmware]'"
 
 
 def emulator_available() -> bool:
     """Whether the emulator is installed."""
-    return importlib.util.find_spec("unicorn") is not None
+    return not missing("unicorn")
 
 
 def require_emulator() -> None:
     """Raise `InputError` that says what to install when the emulator is missing."""
-    if not emulator_available():
-        raise InputError(_NEEDED)
+    require("the emulated board", "unicorn")
 
 
 class BoardProcess:
@@ -81,7 +79,7 @@ class BoardProcess:
         path = image_path(str(image)) if str(image) in IMAGES else Path(image)
         if not path.is_file():
             raise InputError(f"{image}: no such image; valid: {', '.join(IMAGES)}, or the path of an ELF file")
-        compiled = importlib.util.find_spec("ziglang") is not None
+        compiled = not missing("ziglang")
         self.fast = (compiled if fast is None else fast) and not trace and not lose_every
         self._conversions = conversions or RestPhysics()
         self._calling = threading.Lock()  # one thread may serve a port while another presses reset
@@ -90,7 +88,7 @@ class BoardProcess:
         self._process = context.Process(
             target=_work, args=(theirs, path, tuple(chips), self.fast, trace, lose_every, array), daemon=True
         )
-        with _without_main():
+        with _without_main(), _without_interrupt():
             self._process.start()
         theirs.close()
         self._call("ready")
@@ -208,6 +206,22 @@ def _without_main() -> Iterator[None]:
         yield
     finally:
         sys.modules["__main__"] = main
+
+
+@contextmanager
+def _without_interrupt() -> Iterator[None]:
+    """Let a new process leave Ctrl-C, which a terminal sends to every process, to the one that starts it.
+
+    A process begins with the blocked signals of the thread that starts it.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _work(

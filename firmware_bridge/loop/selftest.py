@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 from dataclasses import dataclass
 
 from firmware_bridge.frames.commands import Command, encode_command, sample_at, set_rate
@@ -10,6 +9,7 @@ from firmware_bridge.frames.decoder import SampleDecoder, Status
 from firmware_bridge.host.chip_selftest import judge
 from firmware_bridge.loop.board_process import BoardProcess, require_emulator
 from firmware_bridge.lpc1768.build import check_image
+from gfimu.optional_packages import missing
 
 __all__ = ["SelfTestRow", "run_selftest"]
 
@@ -39,7 +39,7 @@ def run_selftest() -> list[SelfTestRow]:
     """
     require_emulator()
     rows = [_image("gfimu"), _image("selfcheck"), _interrupts(), _chips()]
-    if importlib.util.find_spec("ziglang") is not None:
+    if not missing("ziglang"):
         rows.append(_fast_path())
     return rows
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import importlib.util
 import struct
 import subprocess
 import sys
@@ -18,6 +17,7 @@ import tomli_w
 from firmware_bridge.lpc1768.elf import ElfImage
 from gfimu.errors import GfimuError, InputError
 from gfimu.files.atomic_file import atomic_path, write_text
+from gfimu.optional_packages import require
 
 __all__ = [
     "ARRAY_SYMBOL",
@@ -56,7 +56,6 @@ _LONGEST_NAME = 24  # bytes of a frame's payload
 _VECTORS_SUMMED = 7
 _CODE_READ_PROTECTION = 0x2FC  # UM10360 32.6
 _UNPROTECTED = b"\xff\xff\xff\xff"
-MISSING_COMPILER = "the firmware can't be built: ziglang is not installed; pip install 'gfimu[firmware]'"
 
 
 @dataclass(frozen=True)
@@ -108,8 +107,7 @@ def compiler_version() -> str:
     InputError
         If `ziglang` is not installed; the message says what to install.
     """
-    if importlib.util.find_spec("ziglang") is None:
-        raise InputError(MISSING_COMPILER)
+    require("building the firmware", "ziglang")
     return "ziglang " + _zig("version", cwd=FOLDER).strip()
 
 

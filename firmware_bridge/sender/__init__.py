@@ -1,1 +1,1 @@
-"""A sender for boards of one's own: the firmware's core on a few functions that a user fills in (docs/bench.md)."""
+"""A sender for boards of one's own: the firmware core over functions that a user fills in (docs/how_to/bench.md)."""

@@ -21,7 +21,7 @@ extern "C" {
 #define GFIMU_NOTHING (-1)
 #define GFIMU_DAMAGED (-2)
 
-/* Why the board started: the bits of the identity (docs/frames.md). */
+/* Why the board started: the bits of the identity (docs/reference/frames.md). */
 #define GFIMU_RESET_POWER_ON 1U
 #define GFIMU_RESET_EXTERNAL 2U
 #define GFIMU_RESET_WATCHDOG 4U

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gfimu.array_search.certificate import certify
 from gfimu.array_search.criteria import Goal
@@ -23,6 +24,7 @@ from gfimu.array_search.problem import Design, Problem, Sites
 from gfimu.array_search.search import best_design
 from gfimu.errors import InputError, unknown_name
 from gfimu.geometry.array import AccelerometerArray
+from gfimu.results import Panel, PlottedResult, Series, text_column
 from gfimu.short_repr import short_repr
 
 __all__ = ["CHIPS", "SIZE", "Front", "FrontPoint", "find_front"]
@@ -63,7 +65,7 @@ class FrontPoint:
 
 
 @dataclass(frozen=True)
-class Front:
+class Front(PlottedResult):
     """Arrays none of which is worse than another in both objectives, by the first of them.
 
     Parameters
@@ -80,6 +82,29 @@ class Front:
     points: tuple[FrontPoint, ...]
 
     __repr__ = short_repr
+
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """Return one row per array: chips, and both figures, their unit in the names where they have one."""
+        values = np.array([point.values for point in self.points], dtype=float).reshape(-1, 2)
+        names = [f"{name} [{unit}]" if unit else name for name, unit in zip(self.names, self.units, strict=True)]
+        return {
+            "array": text_column(point.array.name for point in self.points),
+            "chips": np.array([len(point.array.chips) for point in self.points], dtype=int),
+            **{name: values[:, place] for place, name in enumerate(names)},
+        }
+
+    def _heading(self) -> str:
+        return f"Arrays of least {self.names[0]} and {self.names[1]}"
+
+    def _facts(self) -> list[tuple[str, str]]:
+        return list(zip(self.names, self.meanings, strict=True))
+
+    def _panels(self) -> list[Panel]:
+        values = np.array([point.values for point in self.points], dtype=float).reshape(-1, 2)
+        x_label, y_label = (
+            f"{name}, {unit or 'pure number'}" for name, unit in zip(self.names, self.units, strict=True)
+        )
+        return [Panel("front", y_label, (Series("", values[:, 1]),), values[:, 0], x_label)]
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of ``front.json``."""

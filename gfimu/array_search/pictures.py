@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from gfimu.array_search.front import CHIPS, Front
@@ -15,11 +16,6 @@ from gfimu.array_search.shapes import Shape
 from gfimu.files.atomic_file import atomic_path
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.visual.colours import AFTER_ON_PAPER, BEFORE_ON_PAPER, INK, NOISE_ON_PAPER, PALE, chip_colour, css
-
-mpl.use("Agg")
-
-from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
 __all__ = ["array_picture", "front_picture"]
 

@@ -27,7 +27,8 @@ from gfimu.errors import GeometryError, InputError
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.geometry.dilution import gdop_lower_bound
 from gfimu.geometry.kinematics import require_all_motions
-from gfimu.geometry.scoring import Score, score
+from gfimu.geometry.scoring import Score, score, score_panels
+from gfimu.results import Panel, PlottedResult, text_column
 from gfimu.short_repr import short_repr
 
 __all__ = ["Found", "SearchResult", "best_design", "optimize", "search"]
@@ -46,7 +47,7 @@ _DIGITS = 6  # of positions in units, where rounding costs nothing
 
 
 @dataclass(frozen=True)
-class SearchResult:
+class SearchResult(PlottedResult):
     """Best array found.
 
     Parameters
@@ -82,6 +83,29 @@ class SearchResult:
     certificate: Certificate | None
 
     __repr__ = short_repr
+
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """Return the array, one row per channel: position of its chip, m, and sensing axis, body frame."""
+        array = self.array
+        columns: dict[str, NDArray[Any]] = {"channel": text_column(array.channels)}
+        for name, values in (("position_{}_m", array.positions), ("axis_{}", array.axes)):
+            columns |= {name.format(axis): values[:, place] for place, axis in enumerate("xyz")}
+        return columns
+
+    def _heading(self) -> str:
+        return f"Array found: {self.array.name}, {len(self.array.chips)} chips"
+
+    def _facts(self) -> list[tuple[str, str]]:
+        found = [
+            (self.objective.meaning, f"{self.value:.4g} {self.objective.unit}".strip()),
+            ("GDOP", f"{self.score.gdop:.4f} (lower bound {self.gdop_lower_bound:.4f})"),
+            ("condition number κ", f"{self.score.condition_number:.4f}"),
+            ("starts that end there", f"{self.agreeing} of {self.starts}"),
+        ]
+        return found if self.certificate is None else [*found, ("certificate", self.certificate.text)]
+
+    def _panels(self) -> list[Panel]:
+        return score_panels([self.score])
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of ``gfimu optimize --json``."""

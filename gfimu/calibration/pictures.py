@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import matplotlib as mpl
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,7 +20,6 @@ from gfimu.visual.colours import AFTER_ON_PAPER, BEFORE_ON_PAPER, DIVERGING, INK
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-mpl.use("Agg")
 
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator

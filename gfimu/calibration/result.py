@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -24,6 +24,7 @@ from gfimu.files.atomic_file import write_text
 from gfimu.files.input_file import check_input
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
+from gfimu.results import Panel, PlottedResult, Series
 from gfimu.short_repr import joined
 
 __all__ = [
@@ -47,6 +48,18 @@ _READING_UNITS = {"lsb": ("lsb", "m_s2"), "m_s2": ("m_s2", "m_s2"), "rad_s": ("r
 """Reading unit to (name of the reading unit, unit of the true input)."""
 
 
+_KINDS: Mapping[str, Callable[[list[str]], bool]] = {
+    "sensitivity": lambda parts: parts[1] == "M" and parts[2][0] == parts[2][1],
+    "cross-axis sensitivity": lambda parts: parts[1] == "M" and parts[2][0] != parts[2][1],
+    "bias": lambda parts: parts[1] == "b",
+    "position": lambda parts: parts[1] == "r",
+    "quadratic coefficient": lambda parts: parts[1] == "q",
+    "cubic coefficient": lambda parts: parts[1] == "c",
+    "delay": lambda parts: parts[1] == "d",
+}
+"""Kinds of parameters by the parts of their names, each a panel of the picture."""
+
+
 def parameter_names(chip: str, gauge: str) -> tuple[str, ...]:
     """Names of a triad's parameters, in the order of `ErrorModel.parameters`: ``a1_M_xx`` … ``a1_b_z``."""
     elements = [f"{chip}_M_{_AXES[i]}{_AXES[j]}" for i, j in free_elements(gauge)]
@@ -64,7 +77,7 @@ def cubic_names(chips: tuple[str, ...]) -> tuple[str, ...]:
 
 
 @dataclass(frozen=True)
-class Calibration:
+class Calibration(PlottedResult):
     """Parameters of a calibrated triad or array, with their uncertainty.
 
     Parameters
@@ -139,6 +152,41 @@ class Calibration:
             ],
         )
 
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """Return one row per parameter: name, value, standard deviation and unit."""
+        texts = {"parameter": self.names, "unit": self.units}
+        names = {key: np.array(values, dtype=object) for key, values in texts.items()}
+        return {"parameter": names["parameter"], "value": self.values, "std": self.std, "unit": names["unit"]}
+
+    def _table_metadata(self) -> dict[str, Any]:
+        return {key: value for key, value in self.to_dict().items() if key != "parameters"}
+
+    def _facts(self) -> list[tuple[str, str]]:
+        unit = {"m_s2": "m/s²", "rad_s": "rad/s", "lsb": "counts"}[self.unit]
+        undetermined = self.null_space.shape[1]
+        facts = [("method", self.method), ("channels", f"{len(self.channels)} in {unit}"), ("frame", self.gauge)]
+        facts += [("directions that the data do not determine", str(undetermined))] if undetermined else []
+        return facts + [
+            (key, f"{value:.4g}" if isinstance(value, float) else str(value)) for key, value in self.statistics.items()
+        ]
+
+    def _notes(self) -> tuple[str, ...]:
+        return (*self.warnings, *self.statements)
+
+    def _panels(self) -> list[Panel]:
+        """One panel per kind of parameter, what it deviates from an ideal triad where that is 1 or 0."""
+        panels = []
+        for title, belongs in _KINDS.items():
+            places = [place for place, name in enumerate(self.names) if belongs(name.split("_"))]
+            if not places:
+                continue
+            ideal = 1.0 if title == "sensitivity" and self.unit != "lsb" else 0.0
+            unit = self.units[places[0]].replace("m_s2", "m/s²").replace("rad_s", "rad/s")
+            label = f"{title} less 1" if ideal else f"{title}, {unit}" if unit != "1" else title
+            series = Series("", self.values[places] - ideal, self.std[places])
+            panels.append(Panel(f"{title}, ±2σ", label, (series,), tuple(self.names[place] for place in places)))
+        return panels
+
     @property
     def std(self) -> NDArray[np.float64]:
         """Standard deviation of each parameter, shape (p,)."""
@@ -165,7 +213,7 @@ class Calibration:
 
     @property
     def chips(self) -> tuple[str, ...]:
-        """Names of the chips: the channel names without their axis number."""
+        """Names of the chips, the channel names without their axis number."""
         return tuple(channel[:-1] if self.unit != "rad_s" else "gyro" for channel in self.channels[::3])
 
     @cached_property

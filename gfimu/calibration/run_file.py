@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from gfimu.calibration.result import Calibration
 from gfimu.errors import InputError
 from gfimu.files.column_file import open_columns
 from gfimu.files.input_file import is_ordinary
+from gfimu.files.table import ArrowStream
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
 from gfimu.recording.carried_array import array_difference
@@ -22,7 +24,9 @@ __all__ = ["open_calibrated", "open_calibrated_run", "open_references", "open_un
 _TEXT = (".txt", ".txt.gz")
 
 
-def open_uncalibrated(path: str | Path | MappedFile, *, array: AccelerometerArray | None = None) -> Recording:
+def open_uncalibrated(
+    path: str | Path | MappedFile | ArrowStream, *, array: AccelerometerArray | None = None
+) -> Recording:
     """Read a recording to calibrate from: raw counts stay counts, other units become m/s².
 
     CSV and Parquet recordings, MIMU4444 streams, and plain text of rows ``time x y z`` (``.txt``, ``.txt.gz``) as
@@ -36,7 +40,7 @@ def open_uncalibrated(path: str | Path | MappedFile, *, array: AccelerometerArra
     return _open(path, array, None)
 
 
-def open_references(path: str | Path | MappedFile) -> Recording:
+def open_references(path: str | Path | MappedFile | ArrowStream) -> Recording:
     """Read a recording that may hold references alone, such as a gyro on a rate table.
 
     Raises
@@ -50,11 +54,13 @@ def open_references(path: str | Path | MappedFile) -> Recording:
     if isinstance(path, MappedFile):
         return path.read(None)
     whole = format_of_recording(path)
-    return Recording.read(path, needs_channels=False) if whole is None else whole.read(path)
+    if whole is not None:
+        return whole.read(cast("Path", path))
+    return Recording.read(path, needs_channels=False)
 
 
 def open_calibrated(
-    path: str | Path | MappedFile, calibration: Calibration, *, array: AccelerometerArray | None = None
+    path: str | Path | MappedFile | ArrowStream, calibration: Calibration, *, array: AccelerometerArray | None = None
 ) -> Recording:
     """Read a recording in the unit of a calibration and correct it.
 
@@ -67,7 +73,7 @@ def open_calibrated(
 
 
 def open_calibrated_run(
-    path: str | Path | MappedFile, calibration: Calibration, array: AccelerometerArray | None = None
+    path: str | Path | MappedFile | ArrowStream, calibration: Calibration, array: AccelerometerArray | None = None
 ) -> tuple[Recording, AccelerometerArray]:
     """Read a recording with its array and correct both: readings by the error models, positions where fitted.
 
@@ -97,14 +103,14 @@ def _carries(recording: Recording, array: AccelerometerArray) -> bool:
     return own is not None and not array_difference(own, array)
 
 
-def _open(path: str | Path | MappedFile, array: AccelerometerArray | None, unit: str | None) -> Recording:
+def _open(path: str | Path | MappedFile | ArrowStream, array: AccelerometerArray | None, unit: str | None) -> Recording:
     if isinstance(path, MappedFile):
         return path.read(array, unit=unit)
-    if str(path).endswith(_TEXT) and is_ordinary(path):
+    if isinstance(path, str | Path) and str(path).endswith(_TEXT) and is_ordinary(path):
         return read_text_triad(path)
     whole = format_of_recording(path)
     if whole is not None:
-        return whole.read(path)
+        return whole.read(cast("Path", path))
     if unit is None:
         names = open_columns(path).names
         unit = "lsb" if any(name.endswith("_lsb") for name in names) else "m_s2"

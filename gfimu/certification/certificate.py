@@ -20,9 +20,12 @@ from pathlib import Path
 from typing import Any, Literal
 
 import msgspec
+import numpy as np
+from numpy.typing import NDArray
 
 from gfimu.errors import InputError
 from gfimu.files.atomic_file import write_text
+from gfimu.results import TableResult, text_column
 
 __all__ = [
     "FORMAT",
@@ -231,7 +234,7 @@ class Comparison:
 
 
 @dataclass(frozen=True)
-class Certificate:
+class Certificate(TableResult):
     """A calibration certificate of a triad or of all chips of an array.
 
     Parameters
@@ -284,6 +287,29 @@ class Certificate:
     software: str = ""
     format: Literal["gfimu-certificate"] = FORMAT  # type: ignore[assignment]
     format_version: Literal[1] = FORMAT_VERSION  # type: ignore[assignment]
+
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """Return one row per term: value, standard and expanded uncertainty, coverage factor, unit."""
+
+        def number(value: float | None) -> float:
+            return math.nan if value is None else value
+
+        keys = ("value", "std", "expanded", "coverage_factor", "degrees_of_freedom")
+        return {
+            "term": text_column(term.name for term in self.terms),
+            "meaning": text_column(term.meaning for term in self.terms),
+            **{key: np.array([number(getattr(term, key)) for term in self.terms]) for key in keys},
+            "unit": text_column(term.unit for term in self.terms),
+        }
+
+    def _heading(self) -> str:
+        return f"Certificate of {self.item}"
+
+    def _facts(self) -> list[tuple[str, str]]:
+        return [("date", self.date), ("method", self.method), *self.conditions.items()]
+
+    def _notes(self) -> tuple[str, ...]:
+        return (*self.warnings, *self.statements)
 
     @property
     def terms(self) -> tuple[Term, ...]:

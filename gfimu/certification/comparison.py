@@ -1,7 +1,7 @@
 """Comparison of two certificates of one instrument by E_n.
 
 E_n = (x₁ − x₂) / √(U₁² + U₂²) with the expanded uncertainties of both; |E_n| ≤ 1 is satisfactory (ISO 13528, ISO/IEC
-17043; the form from secondary sources, see docs/certificate.md).
+17043; the form from secondary sources, see docs/how_to/certificate.md).
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The quantities that a certificate states of a chip: numbers, and their Jacobian by the parameters of the calibration.
 
 Model equation of an input axis i with its reference axes p and o (IEEE Std 1293; form from secondary sources, see
-docs/certificate.md), without the terms that no method here determines:
+docs/how_to/certificate.md), without the terms that no method here determines:
 
     E = K1 (K0 + a_i + K2 a_i² + K3 a_i³ + δ_o a_p − δ_p a_o + K_ip a_i a_p + K_io a_i a_o + K_po a_p a_o)
 

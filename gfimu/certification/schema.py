@@ -16,7 +16,7 @@ from gfimu.certification.certificate import Certificate
 __all__ = ["SCHEMA_FILE", "certificate_schema"]
 
 SCHEMA_FILE = Path(__file__).with_name("certificate.schema.json")
-"""The published schema; ``docs/make_files_reference.py`` writes it, a test compares it with `certificate_schema`."""
+"""Published schema; docs/scripts/make_files_reference.py writes it, a test compares it with `certificate_schema`."""
 
 _DOCUMENTED = re.compile(r"^(\w[\w, ]*) : .*\n((?: {4}.*\n?)+)", re.MULTILINE)
 _ABOUT = (

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from gfimu.calibration.registry import METHODS
-from gfimu.cli.mapped import ForceOption, MapOption, MapSetOption
-from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, progress
+from gfimu.cli import completion
+from gfimu.cli.output import print_json, print_paths, print_table, progress
+from gfimu.cli.shared_options import ForceOption, JsonOption, MapOption, MapSetOption, PictureOption, shared
 
 if TYPE_CHECKING:
     from gfimu.calibration.result import Calibration
@@ -26,23 +27,34 @@ def register(app: typer.Typer) -> None:
 
 
 def _calibrate(
-    method: Annotated[str, typer.Argument(help=f"Method: {', '.join(METHODS)}.")],
+    method: Annotated[
+        str,
+        typer.Argument(
+            metavar="METHOD", autocompletion=completion.words(*METHODS), help=f"Method: {', '.join(METHODS)}."
+        ),
+    ],
     run: Annotated[
         Path,
-        typer.Argument(help="Recording of static poses: .csv, .parquet, a MIMU4444 stream, or text rows time x y z."),
+        typer.Argument(
+            metavar="RUN", help="Recording of static poses: .csv, .parquet, a MIMU4444 stream, or text rows time x y z."
+        ),
     ],
-    out: Annotated[Path, typer.Option("--out", help="Calibration file to write (JSON).")],
-    array: Annotated[
-        str | None, typer.Option("--array", help="Array: a name or .toml file; else the recording's own.")
-    ] = None,
-    gravity: Annotated[float | None, typer.Option("--gravity", help="Local gravity, m/s².")] = None,
-    latitude: Annotated[float | None, typer.Option("--latitude", help="Latitude, degrees: gravity from it.")] = None,
+    out: Annotated[Path, typer.Option("--out", help="Calibration to write (.json).")],
+    array: Annotated[str | None, shared("--array", more="; else the recording's own")] = None,
+    gravity: Annotated[float | None, shared("--gravity")] = None,
+    latitude: Annotated[float | None, shared("--latitude", more=": gravity from it")] = None,
     height: Annotated[float, typer.Option("--height", help="Height above the ellipsoid, m.")] = 0.0,
     parameters: Annotated[
         int | None, typer.Option("--parameters", help="Per chip: 12 (full matrix) or 9 (triangular).")
     ] = None,
     input_kind: Annotated[
-        str, typer.Option("--input", help="Rows that the fit uses: averaged, raw or wavelet.")
+        str,
+        typer.Option(
+            "--input",
+            metavar="KIND",
+            autocompletion=completion.words("averaged", "raw", "wavelet"),
+            help="Rows that the fit uses: averaged, raw or wavelet.",
+        ),
     ] = "averaged",
     wavelet_level: Annotated[
         int | None, typer.Option("--wavelet-level", help="With --input wavelet: level of the transform; 4 by default.")
@@ -55,10 +67,7 @@ def _calibrate(
             "threshold (soft or hard).",
         ),
     ] = None,
-    rest_threshold: Annotated[
-        float | None,
-        typer.Option("--rest-threshold", help="Threshold of rest, reading unit squared; else from the data."),
-    ] = None,
+    rest_threshold: Annotated[float | None, shared("--rest-threshold")] = None,
     min_rest: Annotated[
         float | None, typer.Option("--min-rest", help="Shortest pose, s; 1 by default, 2 for array.")
     ] = None,
@@ -112,7 +121,7 @@ def _calibrate(
             "--table-axes", help="Gyro's axis along the table's, of RUN and each --also: x,y,-z; else by file."
         ),
     ] = "",
-    picture: Annotated[Path | None, typer.Option("--picture", help="Picture to write (.png, .svg, .pdf).")] = None,
+    picture: PictureOption = None,
     force: ForceOption = False,
     column_map: MapOption = None,
     map_set: MapSetOption = None,
@@ -120,12 +129,15 @@ def _calibrate(
 ) -> None:
     """Calibrate the accelerometers or the gyro of a recording, each parameter with its standard deviation.
 
-    Example: gfimu calibrate multi-position poses.csv --latitude 52.3 --height 80 --out calibration.json
-
-    Non-linearity on a turntable: gfimu calibrate spin run.parquet --calibration static.json --out spin.json
-
-    Checked on other poses: gfimu calibrate multi-position poses.csv --out calibration.json --check others.csv
-    A gyro: gfimu calibrate gyro x.csv --rate-table --also y.csv --also z.csv --table-axes x,y,z --out gyro.json
+    Examples
+    --------
+    gfimu calibrate multi-position poses.csv --latitude 52.3 --height 80 --out calibration.json
+    # Checked on other poses
+    gfimu calibrate multi-position poses.csv --out calibration.json --check others.csv
+    # Non-linearity on a turntable
+    gfimu calibrate spin run.parquet --calibration static.json --out spin.json
+    # A gyro on a rate table
+    gfimu calibrate gyro x.csv --rate-table --also y.csv --also z.csv --table-axes x,y,z --out gyro.json
     """
     from gfimu.commands.calibrate import calibrate
 

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from typer.core import TyperGroup
 
 from gfimu.cli.campaign_views import (
     ByOption,
@@ -18,32 +16,35 @@ from gfimu.cli.campaign_views import (
     status,
     table,
 )
-from gfimu.cli.output import JsonOption, print_json, print_paths, progress
-from gfimu.errors import InputError
+from gfimu.cli.command import CommandApp, GfimuGroup
+from gfimu.cli.output import print_json, print_paths, print_text, progress
+from gfimu.cli.shared_options import JsonOption, shared
+from gfimu.errors import InputError, nearest_name
 
 __all__ = ["register"]
 
 
-class _Campaigns(TyperGroup):
+class _Campaigns(GfimuGroup):
     """The commands; without the name of one, what follows is the plan that `run` takes."""
 
     default = "run"
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        if args and args[0] not in {*self.commands, "--help"}:
-            meant = get_close_matches(args[0], self.commands, 1)
+        if args and args[0] not in {*self.commands, "--help", "-h"}:
+            meant = nearest_name(args[0], self.commands)
             if meant and not Path(args[0]).exists():
-                raise InputError(f"{args[0]}: neither a plan nor a command; did you mean gfimu campaign {meant[0]}?")
+                raise InputError(f"{args[0]}: neither a plan nor a command; did you mean gfimu campaign {meant}?")
             args = [self.default, *args]
         return super().parse_args(ctx, args)
 
 
 def register(app: typer.Typer) -> None:
     """Add the commands."""
-    group = typer.Typer(
+    group = CommandApp(
         cls=_Campaigns,
         help="Run many simulated cases by a plan into one dataset, and summarise it; a second call goes on where one "
-        "ended.\n\nExample: gfimu campaign plan.toml --out campaign\n\nThe word run may be left out.",
+        "ended.\n\nThe word run may be left out.\n\nExamples\n--------\ngfimu campaign plan.toml --out campaign\n"
+        "# How far it is, from another terminal\ngfimu campaign status campaign",
         no_args_is_help=True,
         subcommand_metavar="PLAN --out DIR | COMMAND [ARGS]...",
     )
@@ -55,14 +56,12 @@ def register(app: typer.Typer) -> None:
 
 
 def _run(
-    plan: Annotated[Path, typer.Argument(help="Plan (.toml), or the folder of a campaign, of which nothing is run.")],
-    out: Annotated[
-        Path | None, typer.Option("--out", help="Folder to write; one that was begun is gone on with.")
-    ] = None,
+    plan: Annotated[
+        Path, typer.Argument(metavar="PLAN", help="Plan (.toml), or the folder of a campaign, of which nothing is run.")
+    ],
+    out: Annotated[Path | None, typer.Option("--out", help="Folder to write; one that was begun is continued.")] = None,
     by: ByOption = None,
-    workers: Annotated[
-        int | None, typer.Option("--workers", help="Processes, or jobs of slurm; by default one per processor.")
-    ] = None,
+    workers: Annotated[int | None, shared("--workers", more="; with --cluster slurm, jobs")] = None,
     cluster: Annotated[
         str, typer.Option("--cluster", help="Dask scheduler instead, such as tcp://host:8786, or slurm.")
     ] = "",
@@ -70,9 +69,15 @@ def _run(
 ) -> None:
     """Run the cases of a plan that the folder lacks, and summarise them; or summarise a folder.
 
-    Example: gfimu new plan --out plan.toml, then gfimu campaign plan.toml --out campaign
+    Exit code 1 if every case failed. After Ctrl-C the finished cases stay; the same command goes on with the others.
 
-    Example: gfimu campaign campaign --by method
+    Examples
+    --------
+    # A plan to edit, then its cases
+    gfimu new plan --out plan.toml
+    gfimu campaign plan.toml --out campaign
+    # Summarise a folder by a factor
+    gfimu campaign campaign --by method
     """
     from gfimu.commands.campaign import campaign
 
@@ -81,12 +86,15 @@ def _run(
             plan, out=out, by=by or [], workers=workers, cluster=cluster, progress=_Shown(f"campaign {plan}", done)
         )
     if json:
-        print_json(found.to_dict())
-        return
-    print_groups(f"{found.folder}: {found.done} of {found.cases} cases", found.groups)
-    print_failures(found.failures)
-    if out is not None:
-        print_paths([("campaign", out)])
+        print_json(found.to_dict() | {"files": {} if out is None else {"campaign": out}})
+    else:
+        print_groups(f"{found.folder}: {found.done} of {found.cases} cases", found.groups)
+        print_failures(found.failures)
+        if out is not None:
+            print_paths([("campaign", out)])
+    if out is not None and found.done == sum(found.failures.values()):
+        print_text("every case failed", style="yellow", stderr=True)
+        raise typer.Exit(1)
 
 
 class _Shown:

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, print_text
+from gfimu.cli.output import print_json, print_paths, print_table, print_text, progress
+from gfimu.cli.shared_options import JsonOption, shared
 
 if TYPE_CHECKING:
     from gfimu.commands.campaign_views import CampaignTable
@@ -18,17 +19,20 @@ if TYPE_CHECKING:
 
 __all__ = ["ByOption", "duration_text", "plot", "print_failures", "print_groups", "status", "table"]
 
-FolderArgument = Annotated[Path, typer.Argument(help="Folder of the campaign.")]
-ByOption = Annotated[
-    list[str] | None,
-    typer.Option("--by", metavar="FACTOR", help="Factor to group by; may be repeated. A range is cut into fifths."),
-]
+FolderArgument = Annotated[Path, typer.Argument(metavar="DIR", help="Folder of the campaign.")]
+ByOption = Annotated[list[str] | None, shared("--by")]
 
 
 def status(folder: FolderArgument, json: JsonOption = False) -> None:
     """Say how far a campaign is, also while another process runs it: cases, rate, time left, failures.
 
-    Example: gfimu campaign status campaign
+    Writes nothing.
+
+    Examples
+    --------
+    gfimu campaign status campaign
+    # For a monitor
+    gfimu campaign status campaign --json
     """
     from gfimu.commands.campaign_views import campaign_status
 
@@ -57,13 +61,18 @@ def table(
 ) -> None:
     """Print quantiles of each result by the values of factors, and which factors cause its variance.
 
-    Example: gfimu campaign table campaign --by method --csv quantiles.csv
+    Examples
+    --------
+    gfimu campaign table campaign --by method
+    # The quantiles as a file
+    gfimu campaign table campaign --by method --csv quantiles.csv
     """
     from gfimu.commands.campaign_views import campaign_table
 
-    found = campaign_table(folder, by=by or [], csv=csv)
+    with progress("reading the campaign"):
+        found = campaign_table(folder, by=by or [], csv=csv)
     if json:
-        print_json(found.to_dict())
+        print_json(found.to_dict() | {"files": {} if csv is None else {"quantiles": csv}})
         return
     print_groups(str(folder), found.groups)
     _print_sensitivities(found)
@@ -73,20 +82,29 @@ def table(
 
 def plot(
     folder: FolderArgument,
-    out: Annotated[Path, typer.Option("--out", help="Picture to write: .png, .svg or .html.")],
+    out: Annotated[Path, typer.Option("--out", help="Picture to write (.png, .svg, .html).")],
     result: Annotated[
         list[str] | None,
         typer.Option("--result", metavar="NAME", help="Result to draw; may be repeated. The first four by default."),
     ] = None,
+    json: JsonOption = False,
 ) -> None:
     """Draw results against each factor, and which factors cause their variance.
 
-    Example: gfimu campaign plot campaign --out campaign.png
+    Examples
+    --------
+    gfimu campaign plot campaign --out campaign.png
+    # One result, to zoom into
+    gfimu campaign plot campaign --result rate_rmse_rad_s --out campaign.html
     """
     from gfimu.commands.campaign_views import campaign_plot
 
-    campaign_plot(folder, out=out, result=result or [])
-    print_paths([("picture", out)])
+    with progress("drawing"):
+        drawn = campaign_plot(folder, out=out, result=result or [])
+    if json:
+        print_json({"results": drawn, "files": {"picture": out}})
+    else:
+        print_paths([("picture", out)])
 
 
 def print_groups(title: str, groups: Sequence[Group]) -> None:

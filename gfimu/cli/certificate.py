@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, print_text
+from gfimu.cli.output import print_json, print_paths, print_table, print_text, progress
+from gfimu.cli.shared_options import JsonOption, shared
 
 if TYPE_CHECKING:
     from gfimu.certification.certificate import Certificate, Term
@@ -35,10 +36,7 @@ def _certificate(
             "--stage", help="Errors of stage and gravity, for the budget (.toml); gfimu new stage writes one to edit."
         ),
     ] = None,
-    array: Annotated[
-        str | None,
-        typer.Option("--array", help="Array, a name or .toml file: adds its sheet as an angular sensor (IEEE 671)."),
-    ] = None,
+    array: Annotated[str | None, shared("--array", more=". Adds its sheet as an angular sensor (IEEE 671)")] = None,
     rest: Annotated[
         Path | None,
         typer.Option(
@@ -51,20 +49,23 @@ def _certificate(
 ) -> None:
     """State a calibration in the terms of IEEE 1293 and NIST, with expanded uncertainties and their budget.
 
-    Example: gfimu certificate calibration.json --item "cube no. 7" --date 2026-11-27 --out certificate
-
-    With the stage: gfimu certificate calibration.json --stage plate.toml --out certificate
-
-    The array as an angular sensor: gfimu certificate calibration.json --array cube12 --rest rest.parquet
-
-    Two laboratories: gfimu certificate calibration.json --compare theirs.json
+    Examples
+    --------
+    gfimu certificate calibration.json --item "cube no. 7" --date 2026-11-27 --out certificate
+    # With the errors of the stage
+    gfimu certificate calibration.json --stage plate.toml --out certificate
+    # The array as an angular sensor
+    gfimu certificate calibration.json --array cube12 --rest rest.parquet
+    # Two laboratories
+    gfimu certificate calibration.json --compare theirs.json
     """
     from gfimu.certification.page import FILES
     from gfimu.commands.certificate import certificate
 
-    found = certificate(
-        calibration, out=out, compare=compare, stage=stage, array=array, rest=rest, item=item, date=date
-    )
+    with progress("stating the calibration"):
+        found = certificate(
+            calibration, out=out, compare=compare, stage=stage, array=array, rest=rest, item=item, date=date
+        )
     files = {} if out is None else {meaning: out / name for name, meaning in FILES.items()}
     if json:
         print_json(found.to_dict() | {"files": files})

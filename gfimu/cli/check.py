@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from gfimu.cli.mapped import MapOption, MapSetOption
-from gfimu.cli.output import JsonOption, print_json, print_table, print_text
+from gfimu.cli.output import print_json, print_table, print_text, progress
+from gfimu.cli.shared_options import JsonOption, MapOption, MapSetOption, TwinOption
 
 if TYPE_CHECKING:
     from gfimu.diagnosis.design.run_check import RunCheck
@@ -24,18 +24,25 @@ def register(app: typer.Typer) -> None:
 
 def _check(
     runs: Annotated[list[Path], typer.Argument(metavar="RUN...", help="Recordings of one rig.")],
-    twin: Annotated[str, typer.Option("--twin", help="What the simulation believes: a name, or a twin file (.toml).")],
+    twin: TwinOption,
     column_map: MapOption = None,
     map_set: MapSetOption = None,
     json: JsonOption = False,
 ) -> None:
     """Look at recordings before a diagnosis: quality of the data, effects their motion separates, what to record next.
 
-    Example: gfimu check run.parquet --twin cube12_turntable
+    Writes nothing.
+
+    Examples
+    --------
+    gfimu check run.parquet --twin cube12_turntable
+    # Several recordings of one rig
+    gfimu check slow.parquet fast.parquet --twin cube12_turntable
     """
     from gfimu.commands.check import check
 
-    found = check(runs, twin, column_map=column_map, map_set=map_set or [])
+    with progress("looking at the recordings"):
+        found = check(runs, twin, column_map=column_map, map_set=map_set or [])
     if json:
         print_json(found.to_dict())
     else:

@@ -7,21 +7,38 @@ from collections.abc import Iterator, MutableMapping
 from typing import Any
 
 import typer
-from typer.core import TyperGroup
 
+from gfimu.cli.command import CommandApp, GfimuGroup
 from gfimu.cli.command_list import COMMANDS, JOBS
+from gfimu.cli.completion import Offer
 
-__all__ = ["CommandGroup"]
+__all__ = ["JSON_ASKED", "CommandGroup"]
 
-_INDENT = 6  # columns that a list of help takes beside its two texts
+_HELP = "help"
+
+JSON_ASKED = "gfimu.json"
+"""Key of a context: whether the arguments hold --json."""
 
 
-class CommandGroup(TyperGroup):
+class CommandGroup(GfimuGroup):
     """The program: commands that load on their first use, listed by job."""
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(**settings)
         self.commands = _Commands()
+
+    def shell_complete(self, ctx: Any, incomplete: str) -> list[Any]:
+        """Return the commands that begin so, without importing any, or the options of the program."""
+        if incomplete.startswith("-"):
+            return super().shell_complete(ctx, incomplete)
+        return [Offer(name, entry.help) for name, entry in COMMANDS.items() if name.startswith(incomplete)]
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parse the arguments; ``help COMMAND`` is ``COMMAND --help``."""
+        ctx.meta[JSON_ASKED] = "--json" in args
+        if args and args[0] == _HELP:
+            args = [*args[1:], "--help"]
+        return super().parse_args(ctx, args)
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """Write the commands of each job, without importing any."""
@@ -40,7 +57,7 @@ class _Commands(MutableMapping[str, Any]):
 
     def __getitem__(self, name: str) -> Any:
         if name not in self._loaded:
-            app = typer.Typer(rich_markup_mode="markdown")
+            app = CommandApp()
             app.callback()(_no_options)  # a group even where a file registers one command
             importlib.import_module(f"gfimu.cli.{COMMANDS[name].file}").register(app)
             group = typer.main.get_command(app)

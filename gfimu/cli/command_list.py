@@ -33,6 +33,11 @@ JOBS: dict[str, tuple[Entry, ...]] = {
             "show",
         ),
         Entry("new", "Write a commented file to edit.", "new"),
+        Entry(
+            "schema",
+            "Print the JSON schema of what a command prints with --json: every key with its meaning and unit.",
+            "schema",
+        ),
     ),
     "Bring a recording": (
         Entry(
@@ -43,7 +48,7 @@ JOBS: dict[str, tuple[Entry, ...]] = {
         ),
         Entry(
             "convert",
-            "Convert a recording between CSV and Parquet, or import a MIMU4444 stream or a foreign file. Readings "
+            "Convert a recording between CSV and Parquet, or import MIMU4444 streams and foreign files. Readings "
             "become m/s².",
             "convert",
         ),

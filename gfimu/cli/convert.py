@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gfimu.cli.mapped import MapOption, MapSetOption, TableOption
-from gfimu.cli.output import JsonOption, print_json, print_paths, print_table
+from gfimu.cli import completion
+from gfimu.cli.output import print_json, print_paths, print_table, progress
+from gfimu.cli.shared_options import JsonOption, MapOption, MapSetOption, shared
 
 if TYPE_CHECKING:
     from gfimu.calibration.result import Calibration
@@ -35,12 +36,13 @@ def _convert(
     target: Annotated[
         Path,
         typer.Argument(
+            metavar="TARGET",
             help="File to write: .csv, .parquet, .mcap (ROS 2), .euroc (a folder); .yaml of a calibration; .xml of an "
-            "array, for MuJoCo."
+            "array, for MuJoCo.",
         ),
     ],
     array: Annotated[
-        str | None, typer.Option("--array", help="Array whose channels must be there; else every channel found.")
+        str | None, shared("--array", more="; its channels must be there, else every channel found is taken")
     ] = None,
     column_map: MapOption = None,
     map_set: MapSetOption = None,
@@ -52,11 +54,13 @@ def _convert(
             help="Rows to leave out, counted: corrupt, out_of_range, missing, duplicates, unordered.",
         ),
     ] = "",
-    table: TableOption = None,
+    table: Annotated[str | None, shared("--table")] = None,
     to: Annotated[
         str | None,
         typer.Option(
             "--to",
+            metavar="FORMAT",
+            autocompletion=completion.words("kalibr", "ros", "turntable", "motor_turntable", "free_cube"),
             help="Of a calibration, the format: kalibr or ros. Of an array: turntable, motor_turntable or free_cube.",
         ),
     ] = None,
@@ -70,44 +74,45 @@ def _convert(
     ] = None,
     json: JsonOption = False,
 ) -> None:
-    """Convert a recording between CSV and Parquet, or import a MIMU4444 stream or a foreign file. Readings become m/s².
+    r"""Convert a recording between CSV and Parquet, or import MIMU4444 streams and foreign files. Readings become m/s².
 
-    Example: gfimu convert exp_1.bin.gz run.parquet
-
-    A Klipper recording: gfimu convert adxl345-x.csv run.parquet --map klipper
-
-    A file of unknown layout: gfimu inspect log.txt --out log.toml, then gfimu convert log.txt run.csv --map log.toml
-
-    A calibration for Kalibr: gfimu convert cal.json imu.yaml --to kalibr --array mine.toml --noise rest.parquet
-
-    For ROS 2: gfimu convert run.parquet run.mcap
-
-    An array as a MuJoCo model: gfimu convert mine.toml mine.xml --to motor_turntable
-
-    A plain csv, no map written: gfimu convert log.csv run.csv --map-set time.column=ms --map-set time.unit=ms
-    --map-set unit=g --map-set channels.a11=ax --map-set channels.a12=ay --map-set channels.a13=az
-
-    A damaged recording: gfimu convert run.csv clean.csv --drop corrupt,duplicates
-
-    One file per chip on a common clock: gfimu convert chip1.csv chip2.csv run.parquet --map klipper --array mine.toml
+    Examples
+    --------
+    gfimu convert exp_1.bin.gz run.parquet
+    # A Klipper recording
+    gfimu convert adxl345-x.csv run.parquet --map klipper
+    # One file per chip on a common clock
+    gfimu convert chip1.csv chip2.csv run.parquet --map klipper --array mine.toml
+    # A plain csv, no map written
+    gfimu convert log.csv run.csv --map-set time.column=ms --map-set time.unit=ms --map-set unit=g \
+        --map-set channels.a11=ax --map-set channels.a12=ay --map-set channels.a13=az
+    # A damaged recording
+    gfimu convert run.csv clean.csv --drop corrupt,duplicates
+    # For ROS 2
+    gfimu convert run.parquet run.mcap
+    # A calibration for Kalibr
+    gfimu convert cal.json imu.yaml --to kalibr --array mine.toml --noise rest.parquet
+    # An array as a MuJoCo model
+    gfimu convert mine.toml mine.xml --to motor_turntable
     """
     from gfimu.commands.convert import convert
     from gfimu.geometry.array import AccelerometerArray
     from gfimu.recording import Recording
 
-    recording = convert(
-        source,
-        target,
-        array=array,
-        column_map=column_map,
-        map_set=map_set or [],
-        drop=drop,
-        table=table,
-        to=to,
-        lsb_m_s2=lsb_m_s2,
-        chip=chip,
-        noise=noise,
-    )
+    with progress("converting"):
+        recording = convert(
+            source,
+            target,
+            array=array,
+            column_map=column_map,
+            map_set=map_set or [],
+            drop=drop,
+            table=table,
+            to=to,
+            lsb_m_s2=lsb_m_s2,
+            chip=chip,
+            noise=noise,
+        )
     if isinstance(recording, AccelerometerArray):
         _print_array(recording, target, json=json)
         return

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, print_text
+from gfimu.cli.output import print_json, print_paths, print_table, print_text
+from gfimu.cli.shared_options import JsonOption, shared
 
 __all__ = ["register"]
 
@@ -19,25 +21,35 @@ def register(app: typer.Typer) -> None:
 
 
 def _demo(
-    out: Annotated[Path, typer.Option("--out", help="Folder to write to; made if it isn't there.")] = Path(
+    out: Annotated[Path, typer.Option("--out", help="Folder to write; made where it is not there.")] = Path(
         "gfimu-demo"
     ),
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of everything left to chance.")] = 1,
+    seed: Annotated[int, shared("--seed", min=0)] = 1,
     json: JsonOption = False,
 ) -> None:
     """Run the paper's experiment in simulation: geometry, recording, estimate, drift, picture, diagnosis.
 
-    Example: gfimu demo --out demo
+    Writes a folder with the recording, the estimate, pictures, a rerun recording and the diagnosis with its report. It
+    takes about a minute.
+
+    Examples
+    --------
+    gfimu demo
+    # Another draw of the noise, in a folder of your own
+    gfimu demo --out demo --seed 2
     """
     from gfimu.commands.demo import demo
 
     began = time.perf_counter()
-    result = demo(
-        out,
-        seed=seed,
-        report=lambda number, total, what: print_text(f"{number}/{total} {what}", style="dim", stderr=True),
-    )
-    print_text(f"done in {time.perf_counter() - began:.0f} s", style="dim", stderr=True)
+    watched = sys.stderr.isatty()
+
+    def report(number: int, total: int, what: str) -> None:
+        if watched:
+            print_text(f"{number}/{total} {what}", style="dim", stderr=True)
+
+    result = demo(out, seed=seed, report=report)
+    if watched:
+        print_text(f"done in {time.perf_counter() - began:.0f} s", style="dim", stderr=True)
     if json:
         print_json(result.to_dict())
         return

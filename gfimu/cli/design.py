@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gfimu.cli.mapped import MapOption, MapSetOption
-from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, progress
+from gfimu.cli import completion
+from gfimu.cli.output import print_json, print_paths, print_table, progress
+from gfimu.cli.shared_options import JsonOption, MapOption, MapSetOption, TwinOption, shared
 
 if TYPE_CHECKING:
     from gfimu.diagnosis.design.proposal import Proposal
@@ -22,9 +23,12 @@ def register(app: typer.Typer) -> None:
 
 
 def _design(
-    twin: Annotated[str, typer.Option("--twin", help="Twin: a name or a file (.toml).")],
+    twin: TwinOption,
     effects: Annotated[
-        list[str] | None, typer.Argument(metavar="[EFFECT]...", help="Effects to distinguish; or use --verdict.")
+        list[str] | None,
+        typer.Argument(
+            metavar="[EFFECT]...", autocompletion=completion.effects, help="Effects to distinguish; or use --verdict."
+        ),
     ] = None,
     verdict: Annotated[
         Path | None, typer.Option("--verdict", help="Take the effects of an ambiguous verdict (verdict.json).")
@@ -35,20 +39,27 @@ def _design(
     ] = None,
     column_map: MapOption = None,
     map_set: MapSetOption = None,
-    max_rate: Annotated[float, typer.Option("--max-rate", metavar="RAD/S", help="Largest rate of the table.")] = 15.0,
+    max_rate: Annotated[
+        float, typer.Option("--max-rate", metavar="RAD/S", help="Largest rate of the table, rad/s.")
+    ] = 15.0,
     max_acceleration: Annotated[
-        float, typer.Option("--max-acceleration", metavar="RAD/S²", help="Largest angular acceleration of the table.")
+        float,
+        typer.Option("--max-acceleration", metavar="RAD/S²", help="Largest angular acceleration of the table, rad/s²."),
     ] = 20.0,
-    duration: Annotated[float, typer.Option("--duration", metavar="S", help="Length of the recording.")] = 60.0,
+    duration: Annotated[float, shared("--duration")] = 60.0,
     upright: Annotated[bool, typer.Option("--upright", help="Never propose to mount the array differently.")] = False,
     evaluations: Annotated[int, typer.Option("--evaluations", min=1, help="How many profiles to try.")] = 150,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the search.")] = 0,
-    out: Annotated[Path | None, typer.Option("--out", help="Write the experiment as a scenario file (.toml).")] = None,
-    as_json: JsonOption = False,
+    seed: Annotated[int, shared("--seed", min=0)] = 0,
+    out: Annotated[Path | None, typer.Option("--out", help="Scenario to write (.toml): the experiment.")] = None,
+    json: JsonOption = False,
 ) -> None:
     """Propose the table profile, or the mounting, that best separates effects.
 
-    Example: gfimu design tacho_scale sensor_position --twin cube12_turntable --max-rate 12 --out next.toml
+    Examples
+    --------
+    gfimu design tacho_scale sensor_position --twin cube12_turntable --max-rate 12 --out next.toml
+    # The effects of an ambiguous verdict, with the recording at hand
+    gfimu design --verdict diagnosis/verdict.json --run run.parquet --twin cube12_turntable --out next.toml
     """
     from gfimu.commands.design import design
 
@@ -69,7 +80,7 @@ def _design(
             out=out,
             report=advance,
         )
-    if as_json:
+    if json:
         print_json(proposal.to_dict() | {"files": {} if out is None else {"scenario": out}})
         return
     _print(proposal, at_hand=bool(runs))

@@ -9,11 +9,21 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gfimu.cli.mapped import ForceOption, MapOption, MapSetOption, ReferenceMapSetOption
-from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, print_text, progress
+from gfimu.cli.output import print_json, print_paths, print_table, print_text, progress
+from gfimu.cli.shared_options import (
+    ForceOption,
+    JsonOption,
+    MapOption,
+    MapSetOption,
+    ReferenceMapSetOption,
+    TwinOption,
+    shared,
+)
+from gfimu.cli.stop_signals import INTERRUPTED
 from gfimu.errors import InputError
 
 if TYPE_CHECKING:
+    from gfimu.diagnosis.design.run_check import RunCheck
     from gfimu.diagnosis.verdict.verdict import Diagnosis
 
 __all__ = ["register"]
@@ -29,9 +39,9 @@ def _diagnose(
         list[Path],
         typer.Argument(metavar="RUN...", help="Recordings of one rig: .csv, .parquet, .bin; fitted together."),
     ],
-    twin: Annotated[str, typer.Option("--twin", help="What the simulation believes: a name, or a twin file (.toml).")],
+    twin: TwinOption,
     out: Annotated[
-        Path | None, typer.Option("--out", help="Folder for verdict.json, twin.toml, report.html, diagnosis.rrd.")
+        Path | None, typer.Option("--out", help="Folder to write: verdict.json, twin.toml, report.html, diagnosis.rrd.")
     ] = None,
     check: Annotated[
         bool, typer.Option("--check", help="Only look at the recordings, as `gfimu check`: no diagnosis, no --out.")
@@ -40,10 +50,7 @@ def _diagnose(
         list[Path] | None,
         typer.Option("--held-out", metavar="RUN", help="Recording kept for measuring the gain; may be repeated."),
     ] = None,
-    calibration: Annotated[
-        Path | None,
-        typer.Option("--calibration", help="Calibration of the unit, applied first (JSON, from `gfimu calibrate`)."),
-    ] = None,
+    calibration: Annotated[Path | None, shared("--calibration")] = None,
     grammar: Annotated[
         bool,
         typer.Option(
@@ -59,37 +66,46 @@ def _diagnose(
             "--reference", help="Reference of the first run on a clock of its own; aligned as by `gfimu join`."
         ),
     ] = None,
-    reference_map: Annotated[
-        str | None, typer.Option("--reference-map", metavar="MAP", help="Column map of that file.")
-    ] = None,
+    reference_map: Annotated[str | None, shared("--reference-map")] = None,
     reference_map_set: ReferenceMapSetOption = None,
     json: JsonOption = False,
 ) -> None:
     """Show what a simulation gets wrong against recordings, name the cause, extend the simulation, measure the gain.
 
-    Writes the verdict, the extended twin, a report for people and a rerun recording to a folder.
+    Writes the verdict, the extended twin, a report for people and a rerun recording to a folder. The exit code is 0
+    whatever the verdict. After Ctrl-C the result is what had been found by then, and the exit code 130.
 
-    Example: gfimu diagnose run.parquet --twin cube12_turntable --out diagnosis
-
-    What the recording can show, first: gfimu diagnose run.parquet --twin cube12_turntable --check
-
-    A rig known to be unusual: gfimu diagnose run.parquet --twin cube12_turntable --grammar --out diagnosis
-
-    Two loggers of two clocks: gfimu diagnose accel.csv --map mine.toml --reference tacho.csv --twin rig.toml --out d
-
-    A unit fresh from the bench: gfimu diagnose run.parquet --twin cube12_turntable --calibration cal.json --out d
+    Examples
+    --------
+    gfimu diagnose run.parquet --twin cube12_turntable --out diagnosis
+    # What the recording can show, first
+    gfimu diagnose run.parquet --twin cube12_turntable --check
+    # A rig known to be unusual
+    gfimu diagnose run.parquet --twin cube12_turntable --grammar --out diagnosis
+    # Two loggers with two clocks
+    gfimu diagnose accel.csv --map mine.toml --reference tacho.csv --twin rig.toml --out diagnosis
+    # A unit fresh from the bench
+    gfimu diagnose run.parquet --twin cube12_turntable --calibration cal.json --out diagnosis
     """
     if check:
         from gfimu.cli.check import print_check
         from gfimu.commands.check import check as look
 
-        seen = look(runs, twin, column_map=column_map, map_set=map_set or [])
+        with progress("looking at the recordings"):
+            seen = look(runs, twin, column_map=column_map, map_set=map_set or [])
         print_json(seen.to_dict()) if json else print_check(seen)
         return
     if out is None:
         raise InputError("--out is missing: the folder for the diagnosis; --check needs none")
     from gfimu.commands.diagnose import diagnose
-    from gfimu.diagnosis.report.folder import FILES
+    from gfimu.diagnosis.report.folder import files_to_write
+
+    interrupted = False
+
+    def report(share: float, text: str | None = None) -> None:
+        nonlocal interrupted
+        interrupted = interrupted or text == "interrupted"
+        done(share, text)
 
     with progress("diagnosing", total=1.0) as done:
         found = diagnose(
@@ -103,27 +119,40 @@ def _diagnose(
             reference_map=reference_map,
             reference_map_set=reference_map_set or [],
             calibration=calibration,
-            report=done,
+            report=report,
             grammar=grammar,
             force=force,
         )
-    written = {meaning: out / name for name, meaning in FILES.items()}
+    written = {meaning: out / name for name, meaning in files_to_write().items()}
     if json:
         print_json(found.to_dict() | {"files": written})
-        return
-    _print_what_shows(runs, twin, column_map, map_set or [])
-    print_diagnosis(found)
-    print_paths(written.items())
+    else:
+        _print(found, runs, twin, column_map, map_set or [])
+        print_paths(written.items())
+    if interrupted:
+        print_text("gfimu: interrupted; the result is what had been found by then", stderr=True)
+        raise SystemExit(INTERRUPTED)
 
 
-def _print_what_shows(runs: list[Path], twin: str, column_map: str | None, map_set: list[str]) -> None:
-    """Print the data's quality and what the motion can show, before the verdict; nothing where that can't be read."""
+def _print(found: Diagnosis, runs: list[Path], twin: str, column_map: str | None, map_set: list[str]) -> None:
+    """Print what the recordings show, and the diagnosis."""
     from gfimu.cli.check import print_short_check
+
+    with progress("looking at the recordings"):
+        seen = _what_shows(runs, twin, column_map, map_set)
+    if seen is not None:
+        print_short_check(seen)
+    print_diagnosis(found)
+
+
+def _what_shows(runs: list[Path], twin: str, column_map: str | None, map_set: list[str]) -> RunCheck | None:
+    """Return the data's quality and what the motion can show; None where that can't be read."""
     from gfimu.commands.check import check as look
 
     with warnings.catch_warnings(), contextlib.suppress(InputError):  # the diagnosis reports both itself
         warnings.simplefilter("ignore")
-        print_short_check(look(runs, twin, column_map=column_map, map_set=map_set))
+        return look(runs, twin, column_map=column_map, map_set=map_set)
+    return None
 
 
 def print_diagnosis(found: Diagnosis) -> None:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from gfimu.cli.axis_options import AxisOption, AxisPointOption, HubOption, InclinationOption
-from gfimu.cli.mapped import ForceOption, MapOption, MapSetOption
-from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, print_text, progress
+from gfimu.cli.output import print_json, print_paths, print_table, print_text, progress
+from gfimu.cli.shared_options import ForceOption, JsonOption, MapOption, MapSetOption, shared
 from gfimu.errors import InputError
 
 if TYPE_CHECKING:
@@ -31,25 +31,28 @@ def register(app: typer.Typer) -> None:
 def _drift(
     run: Annotated[
         Path | None,
-        typer.Argument(help="Recording with long rests: the drift that it has, beside what its noise predicts."),
+        typer.Argument(
+            metavar="[RUN]", help="Recording with long rests: the drift that it has, beside what its noise predicts."
+        ),
     ] = None,
     array: Annotated[
-        str | None,
-        typer.Option(help="Array: a name or a TOML file; else the recording's own, or cube12 without a recording."),
+        str | None, shared("--array", more="; else the recording's own, or cube12 without a recording")
     ] = None,
-    time: Annotated[float, typer.Option(help="Time since the start of navigation, s.")] = 30.0,
-    bias_mg: Annotated[float, typer.Option(help="Standard deviation of each channel's constant bias, mg.")] = 0.0,
-    noise_ug: Annotated[float, typer.Option(help="White noise of each channel, one-sided density, µg/√Hz.")] = 0.0,
+    duration: Annotated[float, shared("--duration", more=", from the start of navigation")] = 30.0,
+    bias_mg: Annotated[float, shared("--bias-mg")] = 0.0,
+    noise_ug: Annotated[float, shared("--noise-ug")] = 0.0,
     walk_ug: Annotated[float, typer.Option(help="Random walk of each channel's bias, µg/√s.")] = 0.0,
     rate_drift_deg_h: Annotated[float, typer.Option(help="Constant error of the angular rate per axis, °/h.")] = 0.0,
-    rate: Annotated[float, typer.Option(help="Rate of the table about the vertical, rad/s; 0 is at rest.")] = 0.0,
+    speed_rad_s: Annotated[
+        float, shared("--speed-rad-s", more=", of the table about the vertical; 0 is at rest")
+    ] = 0.0,
     offset: Annotated[tuple[float, float], typer.Option(help="Horizontal place of the unit off the axis, x y, m.")] = (
         0.0,
         0.0,
     ),
-    gravity: Annotated[float, typer.Option(help="Local gravity, m/s².")] = 9.80665,
+    gravity: Annotated[float, shared("--gravity")] = 9.80665,
     monte_carlo: Annotated[int, typer.Option(help="Number of nonlinear Monte Carlo runs; 0 for none.")] = 0,
-    seed: Annotated[int, typer.Option(help="Seed of the Monte Carlo.")] = 0,
+    seed: Annotated[int, shared("--seed")] = 0,
     axis: AxisOption = None,
     axis_point: AxisPointOption = (0.0, 0.0, 0.0),
     hub: HubOption = "fixed",
@@ -59,62 +62,67 @@ def _drift(
     ] = 0.1,
     from_position: Annotated[
         tuple[float, float, float] | None,
-        typer.Option(help="Measured position error x y z after --time, m, z up: which bias or drift would explain it?"),
+        typer.Option(
+            help="Measured position error x y z after --duration, m, z up: which bias or drift would explain it?"
+        ),
     ] = None,
     known_bias_mg: Annotated[
         tuple[float, float, float],
         typer.Option(help="With --from-position: known bias of p, x y z, mg; its share is taken off first."),
     ] = (0.0, 0.0, 0.0),
     latitude: Annotated[
-        float | None, typer.Option(help="With --from-position: latitude, degrees, for the Earth's share.")
+        float | None, shared("--latitude", when="With --from-position: ", more=", for the Earth's share")
     ] = None,
     lead: Annotated[
         float | None,
         typer.Option(help="With RUN: rest before each window, from which tilt and biases are read off, s; else 10."),
     ] = None,
-    calibration: Annotated[Path | None, typer.Option(help="With RUN: calibration to apply first (JSON).")] = None,
-    picture: Annotated[Path | None, typer.Option(help="With RUN: picture to write (.png, .svg, .pdf).")] = None,
+    calibration: Annotated[Path | None, shared("--calibration", when="With RUN: ")] = None,
+    picture: Annotated[Path | None, shared("--picture", when="With RUN: ")] = None,
     force: ForceOption = False,
     column_map: MapOption = None,
     map_set: MapSetOption = None,
-    as_json: JsonOption = False,
+    json: JsonOption = False,
 ) -> None:
     """Position-drift budget of an array in closed form, with a Monte Carlo; the drift of a recording at rest.
 
-    Example: `gfimu drift --array cube12 --time 0.3 --bias-mg 35 --noise-ug 290 --monte-carlo 400`
-
-    The paper's inversion: `gfimu drift --from-position 6.42 0 0 --known-bias-mg 1 0 0 --latitude 35.7`
-
-    Of a recording at rest: `gfimu drift run.parquet --time 30 --picture drift.png`
-
-    One chip on a table: `gfimu drift --array arm.toml --axis z --rate 6 --time 60 --bias-mg 5 --noise-ug 290`
+    Examples
+    --------
+    gfimu drift --array cube12 --duration 0.3 --bias-mg 35 --noise-ug 290 --monte-carlo 400
+    # The paper's inversion
+    gfimu drift --from-position 6.42 0 0 --known-bias-mg 1 0 0 --latitude 35.7
+    # Of a recording at rest
+    gfimu drift run.parquet --duration 30 --picture drift.png
+    # One chip on a table
+    gfimu drift --array one_chip --axis z --speed-rad-s 6 --duration 60 --bias-mg 5 --noise-ug 290
     """
     from gfimu.commands.drift import axis_drift, drift, drift_from_position
     from gfimu.commands.drift_of_rest import drift_of_rest
     from gfimu.commands.known_axis import known_axis, turning_axis
     from gfimu.commands.opened import as_array
 
-    budgeted = bias_mg or noise_ug or walk_ug or rate_drift_deg_h or rate or monte_carlo or any(offset)
+    budgeted = bias_mg or noise_ug or walk_ug or rate_drift_deg_h or speed_rad_s or monte_carlo or any(offset)
     if run is not None:
         if budgeted or axis is not None or from_position is not None or any(known_bias_mg) or latitude is not None:
             raise InputError(
-                f"{run}: the drift of a recording goes with --array, --calibration, --time, --lead, --gravity, "
+                f"{run}: the drift of a recording goes with --array, --calibration, --duration, --lead, --gravity, "
                 "--picture, --map and --force; its noise is measured"
             )
-        seen = drift_of_rest(
-            run,
-            array,
-            time=time,
-            lead=10.0 if lead is None else lead,
-            gravity=gravity,
-            calibration=calibration,
-            picture=picture,
-            column_map=column_map,
-            map_set=map_set or [],
-            force=force,
-        )
+        with progress("navigating through the rests"):
+            seen = drift_of_rest(
+                run,
+                array,
+                duration=duration,
+                lead=10.0 if lead is None else lead,
+                gravity=gravity,
+                calibration=calibration,
+                picture=picture,
+                column_map=column_map,
+                map_set=map_set or [],
+                force=force,
+            )
         files = {} if picture is None else {"picture": picture}
-        if as_json:
+        if json:
             print_json(seen.to_dict() | {"files": files})
         else:
             _print_of_rest(seen)
@@ -126,12 +134,12 @@ def _drift(
     if from_position is not None:
         if budgeted or axis is not None:
             raise InputError(
-                "--from-position works errors out; give it with --time, --known-bias-mg, --latitude, --gravity"
+                "--from-position works errors out; give it with --duration, --known-bias-mg, --latitude, --gravity"
             )
         explained = drift_from_position(
-            from_position, time=time, known_bias_mg=known_bias_mg, latitude=latitude, gravity=gravity
+            from_position, duration=duration, known_bias_mg=known_bias_mg, latitude=latitude, gravity=gravity
         )
-        if as_json:
+        if json:
             print_json(explained.to_dict())
         else:
             _print_equivalent(explained)
@@ -145,31 +153,31 @@ def _drift(
         found = axis_drift(
             array,
             axis=turning,
-            time=time,
+            duration=duration,
             bias_mg=bias_mg,
             noise_ug=noise_ug,
             walk_ug=walk_ug,
-            rate=rate,
+            speed_rad_s=speed_rad_s,
             hub_noise_m_s2_rthz=hub_noise,
         )
-        print_json(found.to_dict()) if as_json else _print_about_axis(found)
+        print_json(found.to_dict()) if json else _print_about_axis(found)
         return
     with progress("Monte Carlo", monte_carlo) as advance:
         result = drift(
             array,
-            time=time,
+            duration=duration,
             bias_mg=bias_mg,
             noise_ug=noise_ug,
             walk_ug=walk_ug,
             rate_drift_deg_h=rate_drift_deg_h,
-            rate=rate,
+            speed_rad_s=speed_rad_s,
             offset=offset,
             gravity=gravity,
             monte_carlo=monte_carlo,
             seed=seed,
             progress=advance,
         )
-    if as_json:
+    if json:
         print_json(result.to_dict())
         return
     budget, sample = result.budget, result.sample
@@ -181,9 +189,9 @@ def _drift(
     if sample is not None:
         rows.append([f"Monte Carlo, {sample.runs} runs", "", *map(_length, sample.std[-1]), ""])
         rows.append(["Monte Carlo / total", "", *(f"{r:.2f}" for r in sample.std[-1] / budget.total_std), ""])
-    where = f"turning at {rate:g} rad/s" if rate else "at rest"
+    where = f"turning at {speed_rad_s:g} rad/s" if speed_rad_s else "at rest"
     print_table(
-        f"Position error after {time:g} s, {budget.array}, {where} (1 σ)",
+        f"Position error after {duration:g} s, {budget.array}, {where} (1 σ)",
         ["cause", "law at rest", "x", "y", "z", "share"],
         rows,
     )
@@ -234,13 +242,13 @@ def _print_of_rest(found: RestDrift) -> None:
     if not found.valid:
         print_text(
             f"The prediction is of first order in the tilt, which reaches {found.tilt_std_rad:.2g} rad (1 σ); it holds "
-            f"to {TILT_LIMIT} rad: give a shorter --time.",
+            f"to {TILT_LIMIT} rad: give a shorter --duration.",
             style="yellow",
         )
     where = " ".join(f"{value:.4g}" for value in found.final_m[0])
     print_text(
         f"The first window's error is that of a rate drift of {found.rate_drift_deg_h:.4g} °/h: gfimu drift "
-        f"--from-position {where} --time {found.time_s:g}"
+        f"--from-position {where} --duration {found.time_s:g}"
     )
 
 

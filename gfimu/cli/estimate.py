@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from gfimu.cli import completion
 from gfimu.cli.axis_options import (
     AxisOption,
     AxisPointOption,
@@ -20,8 +21,8 @@ from gfimu.cli.axis_options import (
     PointStdOption,
     RotationStdOption,
 )
-from gfimu.cli.mapped import ForceOption, MapOption, MapSetOption
-from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, print_text, progress
+from gfimu.cli.output import print_json, print_paths, print_table, print_text, progress
+from gfimu.cli.shared_options import ForceOption, JsonOption, MapOption, MapSetOption, RrdOption, shared
 from gfimu.rate.registry import RATE_METHODS, rate_method, recursive_methods
 from gfimu.units import STANDARD_GRAVITY
 
@@ -42,40 +43,46 @@ def register(app: typer.Typer) -> None:
 
 
 def _estimate(
-    run: Annotated[Path, typer.Argument(help="Recording: .csv, .parquet, or a MIMU4444 stream (.bin, .bin.gz).")],
-    out: Annotated[Path, typer.Option("--out", help="Estimate file to write, .parquet or .csv.")],
-    array: Annotated[
-        str | None,
-        typer.Option("--array", help="Array: a name, a .toml file or MJCF sites (.xml); else the recording's own."),
-    ] = None,
-    method: Annotated[str, typer.Option("--method", help=f"Angular rate by: {', '.join(RATE_METHODS)}.")] = "integrate",
+    run: Annotated[
+        Path, typer.Argument(metavar="RUN", help="Recording: .csv, .parquet, or a MIMU4444 stream (.bin, .bin.gz).")
+    ],
+    out: Annotated[Path, typer.Option("--out", help="Estimate to write (.csv, .parquet).")],
+    array: Annotated[str | None, shared("--array", more="; else the recording's own")] = None,
+    method: Annotated[
+        str,
+        typer.Option(
+            "--method",
+            metavar="METHOD",
+            autocompletion=completion.words(*RATE_METHODS),
+            help=f"Angular rate by: {', '.join(RATE_METHODS)}.",
+        ),
+    ] = "integrate",
     form: Annotated[
-        str, typer.Option("--form", help="How readings turn into p and α: auto, linear, joint or recursive.")
+        str,
+        typer.Option(
+            "--form",
+            metavar="FORM",
+            autocompletion=completion.words("auto", "linear", "joint", "recursive"),
+            help="How readings turn into p and α: auto, linear, joint or recursive.",
+        ),
     ] = "auto",
     rest_bias: Annotated[
         bool, typer.Option("--rest-bias", help="Read the biases off the first rest (table level) and take them off.")
     ] = False,
-    calibration: Annotated[
-        Path | None, typer.Option("--calibration", help="Calibration to apply first (JSON, from `gfimu calibrate`).")
-    ] = None,
-    unknown_start: Annotated[
-        bool, typer.Option("--unknown-start", help=f"The run may start spinning ({_RECURSIVE}).")
-    ] = False,
-    gyro: Annotated[bool, typer.Option("--gyro", help=f"Fuse the recording's gyro ({_RECURSIVE}).")] = False,
+    calibration: Annotated[Path | None, shared("--calibration")] = None,
+    unknown_start: Annotated[bool, shared("--unknown-start", more=" (filter, smoother)")] = False,
+    gyro: Annotated[bool, shared("--gyro", more=" (filter, smoother)")] = False,
     position: Annotated[bool, typer.Option("--position", help="Integrate to velocity and position too.")] = False,
     latitude: Annotated[
-        float | None,
-        typer.Option("--latitude", help="Latitude, degrees: the Earth's rotation and the local gravity from it."),
+        float | None, shared("--latitude", more=": the Earth's rotation and the local gravity from it")
     ] = None,
     north_rad: Annotated[
         float | None,
         typer.Option("--north-rad", help="With --latitude: north from the x-axis at the start, about up, rad; else 0."),
     ] = None,
     force: ForceOption = False,
-    keep_faulty: Annotated[
-        bool, typer.Option("--keep-faulty", help=f"Use channels that contradict the others, too ({_RECURSIVE}).")
-    ] = False,
-    rrd: Annotated[Path | None, typer.Option("--rrd", help="Rerun recording to write.")] = None,
+    keep_faulty: Annotated[bool, shared("--keep-faulty", more=" (filter, smoother)")] = False,
+    rrd: RrdOption = None,
     column_map: MapOption = None,
     map_set: MapSetOption = None,
     axis: AxisOption = None,
@@ -89,15 +96,18 @@ def _estimate(
     bias_std: BiasStdOption = 0.0,
     json: JsonOption = False,
 ) -> None:
-    """Estimate p, α, ω, attitude and table angle from a recording.
+    r"""Estimate p, α, ω, attitude and table angle from a recording.
 
-    Example: gfimu estimate run.parquet --method filter --rest-bias --out estimate.parquet
-
-    One chip on a table: gfimu estimate run.csv --array arm.toml --axis z --out estimate.csv
-
-    Two chips on a wheel: gfimu estimate run.csv --array wheel.toml --axis z --hub free --unknown-start --out est.csv
-
-    Mounted by eye: the same with --lever-std-m 0.003 --rotation-std-rad 0.05 --bias-std-m-s2 0.3
+    Examples
+    --------
+    gfimu estimate run.parquet --method filter --rest-bias --out estimate.parquet
+    # One chip on a table
+    gfimu estimate run.csv --array arm.toml --axis z --out estimate.csv
+    # Two chips on a wheel
+    gfimu estimate run.csv --array wheel.toml --axis z --hub free --unknown-start --out est.csv
+    # Mounted by eye
+    gfimu estimate run.csv --array arm.toml --axis z --lever-std-m 0.003 --rotation-std-rad 0.05 \
+        --bias-std-m-s2 0.3 --out est.csv
     """
     from gfimu.commands.estimate import estimate_run
     from gfimu.commands.known_axis import turning_axis

@@ -9,15 +9,18 @@ from typing import Annotated, Any
 
 import typer
 
+from gfimu.cli import completion
+from gfimu.cli.command import CommandApp
 from gfimu.cli.firmware_check import check
-from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, print_text, progress
+from gfimu.cli.output import print_json, print_paths, print_table, print_text, progress
+from gfimu.cli.shared_options import JsonOption, shared
 
 __all__ = ["register"]
 
-ScenarioOption = Annotated[str, typer.Option("--scenario", help="Scenario whose motion the board rides.")]
-SeedOption = Annotated[int, typer.Option("--seed", min=0, help="Seed of the chips and the noise.")]
-ImageOption = Annotated[str, typer.Option("--image", help="Image: gfimu, selfcheck, or an ELF or .bin file.")]
-RateOption = Annotated[int, typer.Option("--rate", help="Sample rate asked of the firmware, 10 to 3200 Hz.")]
+ScenarioOption = Annotated[str, shared("--scenario", more=", whose motion the board rides")]
+SeedOption = Annotated[int, shared("--seed", min=0)]
+ImageOption = Annotated[str, shared("--image")]
+RateOption = Annotated[int, shared("--rate", more=", asked of the firmware, 10 to 3200")]
 PythonOption = Annotated[
     bool, typer.Option("--pure-python", help="Run all peripherals in Python: slower, the same result.")
 ]
@@ -25,7 +28,11 @@ PythonOption = Annotated[
 
 def register(app: typer.Typer) -> None:
     """Add the commands."""
-    group = typer.Typer(help="The LPC1768 image in the emulator: run, build, selftest, trace, faults, check.")
+    group = CommandApp(
+        help="The LPC1768 image in the emulator: run, build, selftest, trace, faults, check.\n\nExamples\n--------\n"
+        "gfimu firmware selftest\n# What each command does\ngfimu firmware run --help",
+        no_args_is_help=True,
+    )
     group.command(name="run")(_run)
     group.command(name="build")(_build)
     group.command(name="selftest")(_selftest)
@@ -37,15 +44,15 @@ def register(app: typer.Typer) -> None:
 
 def _run(
     scenario: ScenarioOption = "paper_run",
-    port: Annotated[str | None, typer.Option("--port", help="pty, or tcp:PORT (0: any free one).")] = None,
+    port: Annotated[str | None, shared("--port", more=" to open: pty, or tcp:PORT (0: any free one)")] = None,
     out: Annotated[
-        Path | None, typer.Option("--out", help="Without a port: record what the board sends to this .csv or .parquet.")
+        Path | None, typer.Option("--out", help="Without a port: recording to write (.csv, .parquet).")
     ] = None,
     duration: Annotated[
-        float | None, typer.Option("--duration", min=0.0, help="Virtual time, s; else the scenario's.")
+        float | None, shared("--duration", more=", of virtual time; else the scenario's", min=0.0)
     ] = None,
     rate: RateOption = 100,
-    range_g: Annotated[int, typer.Option("--range", help="Range asked of the firmware: 2, 4, 8 or 16 g.")] = 16,
+    range_g: Annotated[int, shared("--range", more=", asked of the firmware")] = 16,
     realtime: Annotated[
         bool, typer.Option("--realtime/--no-realtime", help="With a port: keep pace with the clock on the wall.")
     ] = True,
@@ -56,9 +63,13 @@ def _run(
 ) -> None:
     """Run the firmware on an emulated board that rides a scenario: behind a port, or straight into a recording.
 
-    Example: gfimu firmware run --scenario paper_run --port pty
+    Behind a port it runs until the scenario ends, or Ctrl-C (exit code 0).
 
-    Example: gfimu firmware run --scenario paper_run --out run.parquet --rate 800
+    Examples
+    --------
+    gfimu firmware run --scenario paper_run --port pty
+    # Straight into a recording
+    gfimu firmware run --scenario paper_run --out run.parquet --rate 800
     """
     from gfimu.errors import InputError
 
@@ -87,7 +98,7 @@ def _run_to_file(
                 "stream": asdict(made.stream),
                 "identity": None if made.identity is None else asdict(made.identity),
                 "warnings": made.warnings,
-                "files": [out],
+                "files": {"recording": out},
             }
         )
         return
@@ -118,9 +129,9 @@ def _run_behind_port(
 
     def opened(name: str) -> None:
         names.append(name)
-        if not json:
-            print_text(f"board on {name}; Ctrl-C ends it")
-            print_text(f"  gfimu record --port {name} --out run.parquet")
+        # With --json standard output is for the one object at the end; where the board is has to be known before.
+        print_text(f"board on {name}; Ctrl-C ends it", stderr=json)
+        print_text(f"  gfimu record --port {name} --out run.parquet", stderr=json)
 
     report = run(
         scenario=scenario, port=port, duration=duration, rate=rate, range_g=range_g, realtime=realtime, seed=seed,
@@ -144,14 +155,19 @@ def _run_behind_port(
 
 
 def _build(
-    image: Annotated[str, typer.Argument(help="Image: gfimu or selfcheck.")] = "gfimu",
-    out: Annotated[Path | None, typer.Option("--out", help="Folder for the image; else the package's own.")] = None,
+    image: Annotated[
+        str,
+        typer.Argument(
+            metavar="[IMAGE]", autocompletion=completion.words("gfimu", "selfcheck"), help="Image: gfimu or selfcheck."
+        ),
+    ] = "gfimu",
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Folder to write: the image; else the package's own folder.")
+    ] = None,
     array: Annotated[
         str, typer.Option("--array", help="Name of the array on the board, which the board then states to the host.")
     ] = "",
-    baud: Annotated[
-        int | None, typer.Option("--baud", help="Speed of the line after power-on, bits per second; else 115200.")
-    ] = None,
+    baud: Annotated[int | None, shared("--baud", more=", after power-on; else 115200")] = None,
     define: Annotated[
         list[str] | None,
         typer.Option("--define", metavar="NAME=VALUE", help="Preprocessor definition; may be repeated."),
@@ -160,9 +176,11 @@ def _build(
 ) -> None:
     """Compile the firmware from its C sources with the compiler of the ziglang package.
 
-    Example: gfimu firmware build --out build --array cube12_as_built
-
-    Example: gfimu firmware build --out build --baud 460800 --define GFIMU_SPI_HZ=1000000U
+    Examples
+    --------
+    gfimu firmware build --out build --array cube12_as_built
+    # A faster line and a slower bus
+    gfimu firmware build --out build --baud 460800 --define GFIMU_SPI_HZ=1000000U
     """
     from gfimu.commands.firmware import build
     from gfimu.errors import InputError
@@ -173,9 +191,10 @@ def _build(
         if not equals or not name.isidentifier():
             raise InputError(f"--define {item!r}: write NAME=VALUE")
         defines[name] = value
-    report = build(image, out=out, array=array, baud=baud, define=defines)
+    with progress("compiling"):
+        report = build(image, out=out, array=array, baud=baud, define=defines)
     if json:
-        print_json(asdict(report))
+        print_json(asdict(report) | {"files": {"ELF file": report.elf, "image": report.binary}})
         return
     print_table(
         f"image {image}",
@@ -193,11 +212,18 @@ def _build(
 def _selftest(json: JsonOption = False) -> None:
     """Check the emulator and the firmware: interrupts, the chips' self-test, the image, both ways of running.
 
-    Example: gfimu firmware selftest
+    Exit code 1 if a check fails. Writes nothing.
+
+    Examples
+    --------
+    gfimu firmware selftest
+    # For a build server
+    gfimu firmware selftest --json
     """
     from gfimu.commands.firmware import selftest
 
-    rows = selftest()
+    with progress("testing the emulator and the firmware"):
+        rows = selftest()
     if json:
         print_json({"passed": all(row.passed for row in rows), "checks": [asdict(row) for row in rows]})
     else:
@@ -208,9 +234,9 @@ def _selftest(json: JsonOption = False) -> None:
 
 
 def _trace(
-    out: Annotated[Path, typer.Option("--out", help="Trace to write: .vcd for GTKWave, or .rrd for rerun.")],
+    out: Annotated[Path, typer.Option("--out", help="Trace to write (.vcd for GTKWave, .rrd for rerun).")],
     scenario: ScenarioOption = "rest",
-    duration: Annotated[float, typer.Option("--duration", min=0.0, help="Virtual time to trace, s.")] = 0.05,
+    duration: Annotated[float, shared("--duration", more=", of virtual time", min=0.0)] = 0.05,
     skip: Annotated[float, typer.Option("--skip", min=0.0, help="Virtual time before the trace, s.")] = 0.0,
     rate: RateOption = 800,
     seed: SeedOption = 0,
@@ -219,13 +245,18 @@ def _trace(
 ) -> None:
     """Trace register accesses and interrupts of the firmware.
 
-    Example: gfimu firmware trace --out trace.vcd --duration 0.02
+    Examples
+    --------
+    gfimu firmware trace --out trace.vcd --duration 0.02
+    # For rerun, from half a second on
+    gfimu firmware trace --out trace.rrd --skip 0.5
     """
     from gfimu.commands.firmware import trace
 
-    found = trace(out, scenario=scenario, duration=duration, skip=skip, rate=rate, seed=seed, image=image)
+    with progress(f"tracing {image}"):
+        found = trace(out, scenario=scenario, duration=duration, skip=skip, rate=rate, seed=seed, image=image)
     if json:
-        print_json({"events": found.events, "exceptions": found.exceptions, "files": [out]})
+        print_json({"events": found.events, "exceptions": found.exceptions, "files": {"trace": out}})
         return
     rows = [("register accesses", found.accesses), ("exceptions", found.exceptions)]
     print_table(f"{duration:g} s of {image}", ("quantity", "value"), rows)
@@ -235,7 +266,13 @@ def _trace(
 def _faults(seed: SeedOption = 0, json: JsonOption = False) -> None:
     """Break the wire, the supply and the chips, one after another, and show what the host makes of it.
 
-    Example: gfimu firmware faults
+    Exit code 1 if the host takes a fault for data. Writes nothing.
+
+    Examples
+    --------
+    gfimu firmware faults
+    # Other noise
+    gfimu firmware faults --seed 3 --json
     """
     from gfimu.commands.firmware import faults
 

@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gfimu.cli.output import JsonOption, print_json, print_table, print_text
+from gfimu.cli import completion
+from gfimu.cli.output import print_json, print_table, print_text, progress
+from gfimu.cli.shared_options import JsonOption, shared
 
 if TYPE_CHECKING:
     from firmware_bridge.strict.check import CheckReport
@@ -17,26 +19,38 @@ __all__ = ["check"]
 
 
 def check(
-    image: Annotated[str, typer.Argument(help="Image: gfimu, selfcheck, or an ELF or .bin file.")] = "gfimu",
-    seconds: Annotated[float, typer.Option("--seconds", min=0.0, help="Virtual time to run, s.")] = 3.0,
+    image: Annotated[
+        str,
+        typer.Argument(
+            metavar="[IMAGE]",
+            autocompletion=completion.words("gfimu", "selfcheck"),
+            help="Image: gfimu, selfcheck, or an ELF or .bin file.",
+        ),
+    ] = "gfimu",
+    duration: Annotated[float, shared("--duration", more=", of virtual time", min=0.0)] = 3.0,
     chips: Annotated[
-        int, typer.Option("--chips", help="ADXL345s on SSP1, 0 to 4; their chip-selects are P2.0 and so on.")
+        int, shared("--chips", more=": ADXL345s on SSP1, 0 to 4; their chip-selects are P2.0 and so on")
     ] = 4,
     baud: Annotated[
-        int | None, typer.Option("--baud", help="Speed that the UARTs are meant to send at; else any usual one.")
+        int | None, shared("--baud", more=", that the UARTs are meant to send at; else any usual one")
     ] = None,
     time_limit: Annotated[float, typer.Option("--time-limit", min=0.0, help="Real time to spend at most, s.")] = 60.0,
     json: JsonOption = False,
 ) -> None:
     """Run an image on a board that reports what a real LPC1768 would not forgive; exit code 1 if there are faults.
 
-    Example: gfimu firmware check build/gfimu.elf
+    Writes nothing.
 
-    Example: gfimu firmware check blinky.bin --chips 0 --baud 115200 --seconds 1
+    Examples
+    --------
+    gfimu firmware check build/gfimu.elf
+    # An image without chips
+    gfimu firmware check blinky.bin --chips 0 --baud 115200 --duration 1
     """
     from gfimu.commands.firmware import check as check_image
 
-    report = check_image(image, seconds=seconds, chips=chips, baud=baud, time_limit=time_limit)
+    with progress(f"running {image}"):
+        report = check_image(image, duration=duration, chips=chips, baud=baud, time_limit=time_limit)
     if json:
         print_json(asdict(report) | {"faults": report.faults})
     else:

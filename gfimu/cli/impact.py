@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gfimu.cli.mapped import ForceOption, MapOption, MapSetOption
-from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, print_text
+from gfimu.cli import completion
+from gfimu.cli.output import print_json, print_paths, print_table, print_text, progress
+from gfimu.cli.shared_options import ForceOption, JsonOption, MapOption, MapSetOption, PictureOption, shared
 
 if TYPE_CHECKING:
     from gfimu.crash.event import Impact
@@ -22,52 +23,68 @@ def register(app: typer.Typer) -> None:
 
 
 def _impact(
-    recording: Annotated[Path, typer.Argument(help="Recording with the impact: .csv, .parquet; another with --map.")],
-    array: Annotated[
-        str | None, typer.Option("--array", help="Array, a name or .toml file; else the recording's own.")
-    ] = None,
+    recording: Annotated[
+        Path, typer.Argument(metavar="RUN", help="Recording with the impact: .csv, .parquet; another with --map.")
+    ],
+    array: Annotated[str | None, shared("--array", more="; else the recording's own")] = None,
     cfc: Annotated[
         float, typer.Option("--cfc", help="Channel frequency class: 1000 (head), 600, 180, 60, or another.")
     ] = 1000.0,
-    standard: Annotated[str, typer.Option("--standard", help="Of the filter: sae (J211-1) or iso (6487).")] = "sae",
+    standard: Annotated[
+        str,
+        typer.Option(
+            "--standard",
+            metavar="NAME",
+            autocompletion=completion.words("sae", "iso"),
+            help="Of the filter: sae (J211-1) or iso (6487).",
+        ),
+    ] = "sae",
     threshold_g: Annotated[float, typer.Option("--threshold-g", help="Change of a channel that counts, g.")] = 5.0,
     direction: Annotated[
         str, typer.Option("--direction", help="Where the body is accelerated (+x, -x, …): the polarity is checked.")
     ] = "",
-    calibration: Annotated[Path | None, typer.Option("--calibration", help="Calibration to apply first.")] = None,
+    calibration: Annotated[Path | None, shared("--calibration")] = None,
     column_map: MapOption = None,
     map_set: MapSetOption = None,
     out: Annotated[
-        Path | None, typer.Option("--out", help="Recording to write: channels zeroed and filtered, from time zero.")
+        Path | None,
+        typer.Option(
+            "--out", help="Recording to write (.csv, .parquet): channels zeroed and filtered, from time zero."
+        ),
     ] = None,
-    estimate: Annotated[Path | None, typer.Option("--estimate", help="Estimate to write: p, α, ω.")] = None,
-    picture: Annotated[Path | None, typer.Option("--picture", help="Picture to write (.png, .svg, .pdf).")] = None,
+    estimate: Annotated[
+        Path | None, typer.Option("--estimate", help="Estimate to write (.csv, .parquet): p, α, ω.")
+    ] = None,
+    picture: PictureOption = None,
     force: ForceOption = False,
     json: JsonOption = False,
 ) -> None:
     """Measure one impact: channels zeroed and filtered to a class, time zero, polarity, peaks of p, α and ω.
 
-    Example: gfimu impact drop.csv --array nap.toml --cfc 1000 --direction +x --picture drop.png
-
-    Example: gfimu impact drop.csv --array nap.toml --cfc 180 --out drop_cfc180.csv --estimate drop_motion.csv
+    Examples
+    --------
+    gfimu impact drop.csv --array nap.toml --cfc 1000 --direction +x --picture drop.png
+    # The filtered channels and the motion as files
+    gfimu impact drop.csv --array nap.toml --cfc 180 --out drop_cfc180.csv --estimate drop_motion.csv
     """
     from gfimu.commands.impact import impact
 
-    found = impact(
-        recording,
-        array,
-        cfc=cfc,
-        standard=standard,
-        threshold_g=threshold_g,
-        direction=direction,
-        calibration=calibration,
-        column_map=column_map,
-        map_set=map_set or [],
-        out=out,
-        estimate=estimate,
-        picture=picture,
-        force=force,
-    )
+    with progress("measuring the impact"):
+        found = impact(
+            recording,
+            array,
+            cfc=cfc,
+            standard=standard,
+            threshold_g=threshold_g,
+            direction=direction,
+            calibration=calibration,
+            column_map=column_map,
+            map_set=map_set or [],
+            out=out,
+            estimate=estimate,
+            picture=picture,
+            force=force,
+        )
     named = (("recording", out), ("estimate", estimate), ("picture", picture))
     files = {name: path for name, path in named if path is not None}
     if json:

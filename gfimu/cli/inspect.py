@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, print_text
+from gfimu.cli.output import print_json, print_paths, print_table, print_text, progress
+from gfimu.cli.shared_options import JsonOption, shared
 
 if TYPE_CHECKING:
     from gfimu.importing import Inspection
@@ -24,9 +25,12 @@ def register(app: typer.Typer) -> None:
 
 def _inspect(
     file: Annotated[
-        Path, typer.Argument(help="Text, gzipped or zipped, JSON, Parquet, Excel, MATLAB, HDF5, ULog, MCAP, ROS bag.")
+        Path,
+        typer.Argument(
+            metavar="FILE", help="Text, gzipped or zipped, JSON, Parquet, Excel, MATLAB, HDF5, ULog, MCAP, ROS bag."
+        ),
     ],
-    table: Annotated[str, typer.Option("--table", help="Table, topic or member to look at.")] = "",
+    table: Annotated[str, shared("--table")] = "",
     out: Annotated[
         Path | None, typer.Option("--out", help="Column map to write (.toml), to edit and give as --map.")
     ] = None,
@@ -34,11 +38,17 @@ def _inspect(
 ) -> None:
     """Show what a file holds (columns, units, rate, gaps, rails, corrupt values, chips) and a column map to start from.
 
-    Example: gfimu inspect log.csv --out log_map.toml, then gfimu convert log.csv run.parquet --map log_map.toml
+    Examples
+    --------
+    gfimu inspect log.csv
+    # Write the column map, edit it, and import with it
+    gfimu inspect log.csv --out log_map.toml
+    gfimu convert log.csv run.parquet --map log_map.toml
     """
     from gfimu.commands.inspect import inspect
 
-    found = inspect(file, table=table, out=out)
+    with progress("looking at the file"):
+        found = inspect(file, table=table, out=out)
     if json:
         print_json(found.to_dict() | {"files": {} if out is None else {"map": out}})
         return

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gfimu.cli.mapped import MapOption, MapSetOption, ReferenceMapSetOption
-from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, print_text
+from gfimu.cli.output import print_json, print_paths, print_table, print_text, progress
+from gfimu.cli.shared_options import JsonOption, MapOption, MapSetOption, ReferenceMapSetOption, shared
 
 if TYPE_CHECKING:
     from gfimu.joining import Joined
@@ -22,50 +22,48 @@ def register(app: typer.Typer) -> None:
 
 
 def _join(
-    channels: Annotated[Path, typer.Argument(help="Recording of the accelerometers.")],
-    reference: Annotated[Path, typer.Argument(help="File of the tachometer, encoder, command or gyro.")],
-    out: Annotated[Path, typer.Option("--out", help="Recording to write, .csv or .parquet.")],
-    array: Annotated[
-        str | None, typer.Option("--array", help="Array of the channels; else the recording's own.")
-    ] = None,
+    channels: Annotated[Path, typer.Argument(metavar="CHANNELS", help="Recording of the accelerometers.")],
+    reference: Annotated[
+        Path, typer.Argument(metavar="REFERENCE", help="File of the tachometer, encoder, command or gyro.")
+    ],
+    out: Annotated[Path, typer.Option("--out", help="Recording to write (.csv, .parquet).")],
+    array: Annotated[str | None, shared("--array", more="; else the recording's own")] = None,
     column_map: MapOption = None,
     map_set: MapSetOption = None,
-    reference_map: Annotated[
-        str | None, typer.Option("--reference-map", metavar="MAP", help="Column map of a foreign file of references.")
-    ] = None,
+    reference_map: Annotated[str | None, shared("--reference-map")] = None,
     reference_map_set: ReferenceMapSetOption = None,
     most_rate_error: Annotated[
         float,
         typer.Option("--most-rate-error", help="Largest rate error between the clocks that is searched, a ratio."),
     ] = 0.02,
-    force: Annotated[
-        bool,
-        typer.Option(
-            "--force",
-            help="Go on where the checks of units, time, array and channels refuse the file, or the two don't seem to "
-            "belong together.",
-        ),
-    ] = False,
+    force: Annotated[bool, shared("--force", more=", or the two don't seem to belong together")] = False,
     json: JsonOption = False,
 ) -> None:
     """Find the offset and the rate error between two clocks, and put channels and reference into one recording.
 
-    Example: gfimu join logger.csv tacho.csv --map klipper --array mine.toml --out run.parquet
+    Exit code 2 if the two files don't seem to belong together; --force writes them all the same.
+
+    Examples
+    --------
+    gfimu join logger.csv tacho.csv --map klipper --array mine.toml --out run.parquet
+    # A file of references of another layout
+    gfimu join run.csv encoder.csv --reference-map encoder_map.toml --out joined.parquet
     """
     from gfimu.commands.join import join
 
-    found = join(
-        channels,
-        reference,
-        out=out,
-        array=array,
-        column_map=column_map,
-        map_set=map_set or [],
-        reference_map=reference_map,
-        reference_map_set=reference_map_set or [],
-        most_rate_error=most_rate_error,
-        force=force,
-    )
+    with progress("searching the offset between the clocks"):
+        found = join(
+            channels,
+            reference,
+            out=out,
+            array=array,
+            column_map=column_map,
+            map_set=map_set or [],
+            reference_map=reference_map,
+            reference_map_set=reference_map_set or [],
+            most_rate_error=most_rate_error,
+            force=force,
+        )
     if json:
         print_json(found.to_dict() | {"files": {"recording": out}})
         return

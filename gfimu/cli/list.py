@@ -6,7 +6,9 @@ from typing import Annotated
 
 import typer
 
-from gfimu.cli.output import JsonOption, print_json, print_table
+from gfimu.cli import completion
+from gfimu.cli.output import print_json, print_table
+from gfimu.cli.shared_options import JsonOption
 from gfimu.commands.catalogue import KINDS
 
 __all__ = ["register"]
@@ -18,12 +20,21 @@ def register(app: typer.Typer) -> None:
 
 
 def _list(
-    kind: Annotated[str, typer.Argument(help=f"What to list: {', '.join(KINDS)}.")],
+    kind: Annotated[
+        str,
+        typer.Argument(
+            metavar="KIND", autocompletion=completion.words(*KINDS), help=f"What to list: {', '.join(KINDS)}."
+        ),
+    ],
     json: JsonOption = False,
 ) -> None:
     """List what comes with gfimu.
 
-    Example: gfimu list maps
+    Examples
+    --------
+    gfimu list arrays
+    # Names for a script
+    gfimu list scenarios --json
     """
     from gfimu.commands.catalogue import catalogue
 

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from gfimu.cli.axis_options import AxisOption, AxisPointOption, HubOption, InclinationOption
-from gfimu.cli.mapped import ForceOption
+from gfimu.cli.shared_options import ForceOption, JsonOption, shared
 
 __all__ = ["register"]
 
@@ -19,13 +19,8 @@ def register(app: typer.Typer) -> None:
 
 
 def _live(
-    array: Annotated[
-        str | None,
-        typer.Option("--array", help="Array: a name, a .toml file or MJCF sites (.xml); else the stream's own."),
-    ] = None,
-    rate: Annotated[
-        float | None, typer.Option("--rate", help="Nominal sample rate, Hz; else the stream's own.")
-    ] = None,
+    array: Annotated[str | None, shared("--array", more="; else the stream's own")] = None,
+    rate: Annotated[float | None, shared("--rate", more=", nominal; else the stream's own")] = None,
     source: Annotated[
         str,
         typer.Option(
@@ -38,19 +33,16 @@ def _live(
     scale_std: Annotated[
         float, typer.Option("--scale-std", help="Uncertainty of the scale factors, a ratio (0.01 is 1 %).")
     ] = 0.0,
-    bias_std: Annotated[
-        float | None, typer.Option("--bias-std", help="Uncertainty of the biases, m/s²; else the data sheets'.")
-    ] = None,
-    unknown_start: Annotated[bool, typer.Option("--unknown-start", help="The body may be spinning already.")] = False,
-    gyro: Annotated[bool, typer.Option("--gyro", help="Fuse the stream's gyro columns.")] = False,
+    bias_std_m_s2: Annotated[float | None, shared("--bias-std-m-s2", more="; else the data sheets'")] = None,
+    unknown_start: Annotated[bool, shared("--unknown-start")] = False,
+    gyro: Annotated[bool, shared("--gyro")] = False,
     axis: AxisOption = None,
     axis_point: AxisPointOption = (0.0, 0.0, 0.0),
     hub: HubOption = "fixed",
     inclination_rad: InclinationOption = None,
-    keep_faulty: Annotated[
-        bool, typer.Option("--keep-faulty", help="Use every channel, without looking for faulty ones.")
-    ] = False,
+    keep_faulty: Annotated[bool, shared("--keep-faulty")] = False,
     force: ForceOption = False,
+    json: JsonOption = False,
 ) -> None:
     """Estimate the angular rate while samples arrive: CSV lines in, one JSON line per sample out.
 
@@ -58,13 +50,17 @@ def _live(
     Array and rate may stand in comment lines before it, as gfimu record writes them. An estimate comes two samples
     after its own. Where a channel contradicts the others, a line says which, how and since when; it is left out.
 
-    Example: gfimu live --from run.parquet --follow
-
-    Example: ssh pi cat /data/run.csv | gfimu live --array cube12 --rate 100
-
-    A wheel by two chips: gfimu live --from socket://pi:4000 --array wheel.toml --axis z --hub free --unknown-start
+    Examples
+    --------
+    gfimu live --from run.parquet --follow
+    # From another machine
+    ssh pi cat /data/run.csv | gfimu live --array cube12 --rate 100
+    # A wheel by two chips
+    gfimu live --from socket://pi:4000 --array wheel.toml --axis z --hub free --unknown-start
     """
     from gfimu.commands.live import live
+
+    del json  # every line is JSON in any case; with it an error is one too
 
     for line in live(
         array,
@@ -72,7 +68,7 @@ def _live(
         source=source,
         follow=follow,
         scale_std=scale_std,
-        bias_std=bias_std,
+        bias_std_m_s2=bias_std_m_s2,
         unknown_start=unknown_start,
         gyro=gyro,
         axis=axis,

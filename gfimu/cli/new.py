@@ -7,7 +7,9 @@ from typing import Annotated
 
 import typer
 
-from gfimu.cli.output import print_paths
+from gfimu.cli import completion
+from gfimu.cli.output import print_json, print_paths
+from gfimu.cli.shared_options import JsonOption
 from gfimu.commands.catalogue import SENDER, TEMPLATES
 
 __all__ = ["register"]
@@ -19,28 +21,45 @@ def register(app: typer.Typer) -> None:
 
 
 def _new(
-    kind: Annotated[str, typer.Argument(help=f"What to begin: {', '.join((*TEMPLATES, SENDER))}.")],
+    kind: Annotated[
+        str,
+        typer.Argument(
+            metavar="KIND",
+            autocompletion=completion.words(*TEMPLATES, SENDER),
+            help=f"What to begin: {', '.join((*TEMPLATES, SENDER))}.",
+        ),
+    ],
     folder: Annotated[
-        Path | None, typer.Argument(help="Of a sender: folder to write; without it, what to do with it is printed.")
+        Path | None,
+        typer.Argument(
+            metavar="[FOLDER]", help="Of a sender: folder to write; without it, what to do with it is printed."
+        ),
     ] = None,
     out: Annotated[Path | None, typer.Option("--out", help="File to write (.toml); printed without it.")] = None,
     schema: Annotated[
         Path | None, typer.Option("--schema", help="JSON schema to write (.json), for completion in an editor.")
     ] = None,
+    json: JsonOption = False,
 ) -> None:
     """Write a commented file to edit.
 
-    A sender is a folder of C files: with them a microcontroller of yours sends what gfimu record reads.
+    A sender is a folder of C files: with them a microcontroller of yours sends what gfimu record reads. Without --out
+    the file is printed. A file that is there is not replaced.
 
-    Example: gfimu new array --out my_array.toml --schema array.schema.json
-
-    Example: gfimu new sender my_sender
+    Examples
+    --------
+    gfimu new array --out my_array.toml --schema array.schema.json
+    # C files for a board of your own
+    gfimu new sender my_sender
     """
     from gfimu.commands.catalogue import new
 
     text = new(kind, folder, out=out, schema=schema)
-    if folder is None and out is None and schema is None:
-        typer.echo(text, nl=False)
+    named = {kind: folder or out, "schema": schema}
+    files = {what: path for what, path in named.items() if path is not None}
+    if json:
+        print_json({"kind": kind, "text": text, "files": files})
+    elif files:
+        print_paths(files.items())
     else:
-        written = {kind: folder or out, "schema": schema}
-        print_paths([(what, path) for what, path in written.items() if path is not None])
+        typer.echo(text, nl=False)

@@ -8,9 +8,10 @@ from typing import Annotated
 
 import typer
 
+from gfimu.cli import completion
 from gfimu.cli.axis_options import AxisOption, AxisPointOption, HubOption
-from gfimu.cli.mapped import ForceOption, MapOption, MapSetOption
-from gfimu.cli.output import JsonOption, print_json, print_paths, print_table
+from gfimu.cli.output import print_json, print_paths, print_table, progress
+from gfimu.cli.shared_options import ForceOption, JsonOption, MapOption, MapSetOption, PictureOption, shared
 
 __all__ = ["register"]
 
@@ -21,54 +22,62 @@ def register(app: typer.Typer) -> None:
 
 
 def _noise(
-    run: Annotated[Path, typer.Argument(help="Recording at rest: .csv, .parquet, a MIMU4444 stream, or text rows.")],
+    run: Annotated[
+        Path, typer.Argument(metavar="RUN", help="Recording at rest: .csv, .parquet, a MIMU4444 stream, or text rows.")
+    ],
     stretch: Annotated[
-        str, typer.Option("--stretch", help="Samples to use: rest (the longest one) or all (up to the first gap).")
+        str,
+        typer.Option(
+            "--stretch",
+            metavar="KIND",
+            autocompletion=completion.words("rest", "all"),
+            help="Samples to use: rest (the longest one) or all (up to the first gap).",
+        ),
     ] = "rest",
-    rest_threshold: Annotated[
-        float | None,
-        typer.Option("--rest-threshold", help="Threshold of rest, reading unit squared; else from the data."),
-    ] = None,
-    calibration: Annotated[Path | None, typer.Option("--calibration", help="Calibration to apply first.")] = None,
-    kalibr: Annotated[Path | None, typer.Option("--kalibr", help="Kalibr imu.yaml to write.")] = None,
-    picture: Annotated[Path | None, typer.Option("--picture", help="Picture to write (.png, .svg, .pdf).")] = None,
+    rest_threshold: Annotated[float | None, shared("--rest-threshold")] = None,
+    calibration: Annotated[Path | None, shared("--calibration")] = None,
+    kalibr: Annotated[Path | None, typer.Option("--kalibr", help="Kalibr file to write (.yaml).")] = None,
+    picture: PictureOption = None,
     force: ForceOption = False,
     column_map: MapOption = None,
     map_set: MapSetOption = None,
     axis: AxisOption = None,
     axis_point: AxisPointOption = (0.0, 0.0, 0.0),
     hub: HubOption = "fixed",
-    speed: Annotated[float, typer.Option("--speed-rad-s", help="With --axis: rate at which that holds.")] = math.tau,
-    array: Annotated[
-        str | None, typer.Option("--array", help="With --axis: array, a name or .toml file; else the recording's own.")
-    ] = None,
+    speed: Annotated[float, shared("--speed-rad-s", when="With --axis: ", more=", at which that holds")] = math.tau,
+    array: Annotated[str | None, shared("--array", when="With --axis: ", more="; else the recording's own")] = None,
     json: JsonOption = False,
 ) -> None:
     """Identify velocity random walk N, bias instability B, acceleration random walk K, quantisation Q and ramp R.
 
-    Example: gfimu noise rest.parquet --kalibr imu.yaml --picture allan.png
-
-    One chip on a table: gfimu noise rest.parquet --axis z --axis-point -0.1 0 0
+    Examples
+    --------
+    gfimu noise rest.parquet --picture allan.png
+    # For Kalibr
+    gfimu noise rest.parquet --kalibr imu.yaml
+    # One chip on a table
+    gfimu noise rest.parquet --axis z --axis-point -0.1 0 0
     """
     from gfimu.commands.noise import noise
     from gfimu.sensor_noise.identification import TERMS
 
-    result = noise(
-        run,
-        column_map=column_map,
-        map_set=map_set or [],
-        stretch=stretch,
-        rest_threshold=rest_threshold,
-        calibration=calibration,
-        kalibr=kalibr,
-        picture=picture,
-        array=array,
-        axis=axis,
-        axis_point=axis_point,
-        hub=hub,
-        speed_rad_s=speed,
-        force=force,
-    )
+    with progress("identifying the noise"):
+        result = noise(
+            run,
+            column_map=column_map,
+            map_set=map_set or [],
+            stretch=stretch,
+            rest_threshold=rest_threshold,
+            calibration=calibration,
+            kalibr=kalibr,
+            picture=picture,
+            array=array,
+            axis=axis,
+            axis_point=axis_point,
+            hub=hub,
+            speed_rad_s=speed,
+            force=force,
+        )
     written = {} if kalibr is None else {"Kalibr": kalibr}
     written |= {} if picture is None else {"picture": picture}
     if json:

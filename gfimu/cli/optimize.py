@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, print_text, progress
+from gfimu.cli import completion
+from gfimu.cli.output import print_json, print_paths, print_table, print_text, progress
 from gfimu.cli.score import print_scores
+from gfimu.cli.shared_options import JsonOption, shared
 
 if TYPE_CHECKING:
     from gfimu.array_search.front import Front
@@ -29,7 +31,7 @@ def _optimize(
         Path | None,
         typer.Argument(metavar="[BRIEF]", help="Design brief (.toml; gfimu new brief); options replace its values."),
     ] = None,
-    chips: Annotated[int | None, typer.Option("--chips", help="Number of chips.")] = None,
+    chips: Annotated[int | None, shared("--chips")] = None,
     axes_per_chip: Annotated[
         int | None, typer.Option("--axes-per-chip", help="Sensing axes of a chip: 1, 2 or 3; 3 by default.")
     ] = None,
@@ -47,6 +49,8 @@ def _optimize(
         str | None,
         typer.Option(
             "--objective",
+            metavar="NAME",
+            autocompletion=completion.objectives,
             help="What is to be small: gdop (default), gdop_joint, kappa, sigma_alpha, sigma_p, rate, drift, fault; "
             "with _worst at the end over the brief's tolerances.",
         ),
@@ -61,23 +65,24 @@ def _optimize(
     restarts: Annotated[
         int | None, typer.Option("--restarts", help="Most random starts; 40 by default, fewer once ten agree.")
     ] = None,
-    seed: Annotated[int | None, typer.Option("--seed", help="Seed of the random starts; 0 by default.")] = None,
-    out: Annotated[Path | None, typer.Option("--out", help="Write the array as an array file (.toml).")] = None,
-    picture: Annotated[
-        Path | None, typer.Option("--picture", help="Write a picture of the array in its volume (.png, .svg, .pdf).")
-    ] = None,
+    seed: Annotated[int | None, shared("--seed", more="; by default that of the brief, or 0")] = None,
+    out: Annotated[Path | None, typer.Option("--out", help="Array file to write (.toml).")] = None,
+    picture: Annotated[Path | None, shared("--picture", more=": the array in its volume")] = None,
     front: Annotated[
         Path | None, typer.Option("--front", help="Folder to write: the front as picture, table and array files.")
     ] = None,
-    as_json: JsonOption = False,
+    json: JsonOption = False,
 ) -> None:
     """Search the array of chips in a volume for which an objective is least, or the front of two objectives.
 
-    Example: gfimu optimize --chips 5 --non-recursive --out best5.toml
-
-    Example: gfimu new brief --out brief.toml, then gfimu optimize brief.toml --picture best.png
-
-    Example: gfimu optimize --chips 4 --most-chips 10 --pareto chips gdop --front by_chips
+    Examples
+    --------
+    gfimu optimize --chips 5 --non-recursive --out best5.toml
+    # By a design brief
+    gfimu new brief --out brief.toml
+    gfimu optimize brief.toml --picture best.png
+    # What each further chip gains
+    gfimu optimize --chips 4 --most-chips 10 --pareto chips gdop --front by_chips
     """
     from gfimu.array_search.front import Front
     from gfimu.commands.optimize import optimize
@@ -100,15 +105,16 @@ def _optimize(
             front=front,
             report=advance,
         )
-    if as_json:
-        print_json(result.to_dict())
+    named = {"array": out, "picture": picture, "front": front}
+    files = {what: path for what, path in named.items() if path is not None}
+    if json:
+        print_json(result.to_dict() | {"files": files})
         return
     if isinstance(result, Front):
         _print_front(result)
     else:
         _print_result(result)
-    written = [("the array", out), ("the picture", picture), ("the front", front)]
-    print_paths([(what, path) for what, path in written if path is not None])
+    print_paths(files.items())
 
 
 def _print_result(result: SearchResult) -> None:

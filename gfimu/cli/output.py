@@ -8,19 +8,19 @@ from __future__ import annotations
 
 import json
 import math
+import os
+import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-__all__ = ["JsonOption", "console", "plain", "print_json", "print_paths", "print_table", "print_text", "progress"]
-
-JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object for machines instead of tables.")]
+__all__ = ["console", "plain", "print_json", "print_paths", "print_table", "print_text", "progress"]
 
 
 def console(*, stderr: bool = False) -> Console:
@@ -85,18 +85,20 @@ def print_paths(paths: Iterable[tuple[str, str | Path]]) -> None:
 def progress(description: str, total: float | None = None, *, time_left: bool = True) -> Iterator[Any]:
     """Show a progress bar on a terminal; yields a function called with the work done so far (0 to ``total``).
 
+    Without ``total`` the bar moves but does not say how far the work is. In a pipe nothing is shown.
     Without ``time_left`` the bar shows none: where some of the work was done before, its rate is not that of this call.
     """
+    if not sys.stderr.isatty() and not os.environ.get("FORCE_COLOR"):  # a pipe: rich need not be loaded
+        yield lambda done, text=None: None
+        return
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-    screen = console(stderr=True)
     with Progress(
         TextColumn("{task.description}", markup=False),
         BarColumn(),
-        *([TimeRemainingColumn()] if time_left else []),
-        console=screen,
+        *([TimeRemainingColumn()] if time_left and total is not None else []),
+        console=console(stderr=True),
         transient=True,
-        disable=not screen.is_terminal,
     ) as bar:
         task = bar.add_task(description, total=total)
         yield lambda done, text=None: bar.update(task, completed=done, description=text or description)

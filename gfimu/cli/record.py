@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from gfimu.cli.output import JsonOption, console, print_json, print_paths, print_table, print_text
+from gfimu.cli import completion
+from gfimu.cli.output import console, print_json, print_paths, print_table, print_text
+from gfimu.cli.shared_options import JsonOption, shared
 
 if TYPE_CHECKING:
     from firmware_bridge.host.chip_selftest import AxisSelfTest
@@ -29,39 +31,33 @@ def register(app: typer.Typer) -> None:
 def _record(
     port: Annotated[
         str,
-        typer.Option(
+        shared(
             "--port",
-            help="Device, pseudo-terminal, socket://host:port, udp://address:port, klipper:///socket?chip=NAME, or "
-            "phyphox://address:port.",
+            more=": a device, a pseudo-terminal, socket://host:port, "
+            "udp://address:port, klipper:///socket?chip=NAME, or phyphox://address:port",
         ),
     ] = "",
-    out: Annotated[Path | None, typer.Option("--out", help="Recording to write, .csv or .parquet.")] = None,
+    out: Annotated[Path | None, typer.Option("--out", help="Recording to write (.csv, .parquet).")] = None,
     find: Annotated[
         bool, typer.Option("--find", help="Look for the board: every port or --port, every speed and format.")
     ] = False,
     self_test: Annotated[
         bool, typer.Option("--self-test", help="Test the chips first, at rest, against the data sheet's limits.")
     ] = False,
-    duration: Annotated[
-        float | None, typer.Option("--duration", min=0.0, help="Length in s; else until Ctrl-C.")
-    ] = None,
-    rate: Annotated[
-        int | None, typer.Option("--rate", help="Ask the board for this sample rate, 10 to 3200 Hz.")
-    ] = None,
-    range_g: Annotated[int | None, typer.Option("--range", help="Ask the board for ±2, 4, 8 or 16 g.")] = None,
+    duration: Annotated[float | None, shared("--duration", more="; else until Ctrl-C", min=0.0)] = None,
+    rate: Annotated[int | None, shared("--rate", more=", asked of the board, 10 to 3200")] = None,
+    range_g: Annotated[int | None, shared("--range", more=", asked of the board")] = None,
     form: Annotated[
         str,
         typer.Option(
             "--format",
+            metavar="FORMAT",
+            autocompletion=completion.frames,
             help="Frame format: lpc1768 or mimu4444. Or a TOML file (gfimu new frame). Else lpc1768, or what is found.",
         ),
     ] = "",
-    array: Annotated[
-        str, typer.Option("--array", help="Array on the board; else the one that the board states, or the format's.")
-    ] = "",
-    baud: Annotated[
-        int | None, typer.Option("--baud", help="Bits per second; else as the board is, raised if the rate needs it.")
-    ] = None,
+    array: Annotated[str, shared("--array", more="; else the one that the board states, or the format's")] = "",
+    baud: Annotated[int | None, shared("--baud", more="; else as the board is, raised if the rate needs it")] = None,
     reconnect: Annotated[
         float | None,
         typer.Option(
@@ -70,7 +66,7 @@ def _record(
             help="Wait this long, s, for a port that is not there yet and for a lost connection (else: 0 and 60).",
         ),
     ] = None,
-    rrd: Annotated[Path | None, typer.Option("--rrd", help="Rerun recording to write while recording.")] = None,
+    rrd: Annotated[Path | None, shared("--rrd", more=" while recording")] = None,
     live: Annotated[
         bool, typer.Option("--live", "--view", help="Show rate, health and scene in the rerun viewer meanwhile.")
     ] = False,
@@ -79,13 +75,16 @@ def _record(
     """Record from a board (real or virtual), with the angular rate shown as it comes.
 
     If the recording begins with a rest, channels that contradict the others are named while it is made. The file can
-    be read while it grows; if the program is killed, at most the last half second is missing.
+    be read while it grows; if the program is killed, at most the last half second is missing. Ctrl-C ends the recording
+    and keeps it (exit code 0). Exit code 1 if a chip fails the self-test.
 
-    Example: gfimu record --port /dev/ttyUSB0 --out run.parquet --rate 800 --duration 60
-
-    Example: gfimu record --find --self-test --out run.parquet
-
-    Example: gfimu record --port "klipper:///tmp/klippy_uds?chip=hotend,bed" --array pair.toml --out run.parquet
+    Examples
+    --------
+    gfimu record --port /dev/ttyUSB0 --out run.parquet --rate 800 --duration 60
+    # Find the board and test its chips first
+    gfimu record --find --self-test --out run.parquet
+    # A 3-D printer's Klipper
+    gfimu record --port "klipper:///tmp/klippy_uds?chip=hotend,bed" --array pair.toml --out run.parquet
     """
     from gfimu.commands.record import record
 
@@ -186,7 +185,7 @@ def _ask_for_array(candidates: tuple[AccelerometerArray, ...]) -> str:
     from gfimu.errors import InputError
     from gfimu.geometry.array import AccelerometerArray
 
-    print_text("The board does not state how its chips are mounted (docs/bench.md, Which array):")
+    print_text("The board does not state how its chips are mounted (docs/how_to/bench.md, Which array):")
     for array in candidates:
         print_text(f"  {array.name}: {mounting_words(array)}")
     while True:

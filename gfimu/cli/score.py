@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from gfimu.cli import completion
 from gfimu.cli.axis_options import (
     AxisOption,
     AxisPointOption,
@@ -19,7 +20,8 @@ from gfimu.cli.axis_options import (
     PointStdOption,
     RotationStdOption,
 )
-from gfimu.cli.output import JsonOption, print_json, print_table, print_text
+from gfimu.cli.output import print_json, print_table, print_text
+from gfimu.cli.shared_options import JsonOption, shared
 
 if TYPE_CHECKING:
     from gfimu.geometry.scoring import Score
@@ -38,22 +40,29 @@ def register(app: typer.Typer) -> None:
 def _score(
     arrays: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[ARRAY]...", help="Names, array files (.toml) or MJCF files (.xml); all shipped ones."),
+        typer.Argument(
+            metavar="[ARRAY]...",
+            autocompletion=completion.arrays,
+            help="Names, array files (.toml) or MJCF files (.xml); all shipped ones.",
+        ),
     ] = None,
     length_unit: Annotated[
         float | None, typer.Option("--length-unit-m", help="Length that counts as 1, m; else half of each cube's edge.")
     ] = None,
-    speed: Annotated[float, typer.Option("--speed-rad-s", help="Angular speed of the rate bound, rad/s.")] = math.tau,
-    spin_axis: Annotated[str, typer.Option(help="Body axis of that spin: x, y or z.")] = "z",
+    speed: Annotated[float, shared("--speed-rad-s", more=", of the rate bound")] = math.tau,
+    spin_axis: Annotated[
+        str,
+        typer.Option(
+            metavar="AXIS", autocompletion=completion.words("x", "y", "z"), help="Body axis of that spin: x, y or z."
+        ),
+    ] = "z",
     noise: Annotated[
         float, typer.Option("--noise-m-s2", help="Standard deviation of a channel, m/s²: 0.0287 is ADXL345 at 100 Hz.")
     ] = 0.0287,
     axis: AxisOption = None,
     axis_point: AxisPointOption = (0.0, 0.0, 0.0),
     hub: HubOption = "fixed",
-    sample_rate_hz: Annotated[
-        float, typer.Option("--sample-rate-hz", help="Of least faults, and with --axis: sample rate, Hz.")
-    ] = 100.0,
+    rate: Annotated[float, shared("--rate", more=", of least faults, and with --axis")] = 100.0,
     inclination_rad: InclinationOption = None,
     point_std: PointStdOption = 0.0,
     direction_std: DirectionStdOption = 0.0,
@@ -61,7 +70,7 @@ def _score(
     rotation_std: RotationStdOption = 0.0,
     bias_std: BiasStdOption = 0.0,
     duration: Annotated[
-        float, typer.Option("--duration-s", help="With --axis: length of the run that the estimate is predicted for.")
+        float, shared("--duration", when="With --axis: ", more=", that the estimate is predicted for")
     ] = 60.0,
     hub_std: Annotated[
         float,
@@ -74,15 +83,18 @@ def _score(
         float, typer.Option("--fault-time-s", help="Time within which a fault of a channel is to be found, s.")
     ] = 1.0,
     per_channel: Annotated[bool, typer.Option("--per-channel", help="Least fault of every channel.")] = False,
-    as_json: JsonOption = False,
+    json: JsonOption = False,
 ) -> None:
-    """Score array geometries: condition number, GDOP, errors, what ω² leaves, what ω and which faults are seen.
+    r"""Score array geometries: condition number, GDOP, errors, what ω² leaves, what ω and which faults are seen.
 
-    Example: gfimu score cube12 p3_three_plus_one --speed-rad-s 10
-
-    Two chips on a wheel: gfimu score wheel.toml --axis z --hub free --speed-rad-s 12
-
-    Mounted by eye: the same with --lever-std-m 0.003 --rotation-std-rad 0.05 --bias-std-m-s2 0.2
+    Examples
+    --------
+    gfimu score cube12 p3_three_plus_one --speed-rad-s 10
+    # Two chips on a wheel
+    gfimu score wheel.toml --axis z --hub free --speed-rad-s 12
+    # Mounted by eye
+    gfimu score one_chip --axis z --axis-point -0.1 0 0 --lever-std-m 0.003 --rotation-std-rad 0.05 \
+        --bias-std-m-s2 0.2
     """
     from gfimu.commands.score import score
     from gfimu.geometry.scoring import Score
@@ -102,8 +114,8 @@ def _score(
         lever_std_m=lever_std,
         rotation_std_rad=rotation_std,
         bias_std_m_s2=bias_std,
-        sample_rate_hz=sample_rate_hz,
-        duration_s=duration,
+        rate=rate,
+        duration=duration,
         hub_std_m_s2=hub_std,
         jerk_rad2_s5=jerk,
         fault_time_s=fault_time,
@@ -111,7 +123,7 @@ def _score(
     )
     bounds = [entry for entry in scores if not isinstance(entry, Score)]
     figures = [entry for entry in scores if isinstance(entry, Score)]
-    if as_json:
+    if json:
         units = {"length_unit_m": figures[0].length_unit_m} if figures else {}
         print_json(units | {"arrays": [entry.to_dict() for entry in scores]})
         return
@@ -119,7 +131,7 @@ def _score(
         print_scores(figures, f"{speed:.4g} rad/s about {spin_axis} and channel noise {noise:.4g} m/s²")
         _print_protection(figures)
     if bounds:
-        _print_bounds(bounds, noise, sample_rate_hz)
+        _print_bounds(bounds, noise, rate)
 
 
 def print_scores(scores: list[Score], condition: str) -> None:

@@ -7,7 +7,9 @@ from typing import Annotated
 
 import typer
 
-from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, progress
+from gfimu.cli import completion
+from gfimu.cli.output import print_json, print_paths, print_table, progress
+from gfimu.cli.shared_options import JsonOption, RrdOption, shared
 
 __all__ = ["register"]
 
@@ -18,20 +20,33 @@ def register(app: typer.Typer) -> None:
 
 
 def _simulate(
-    scenario: Annotated[str, typer.Argument(help="Name of a scenario, or a scenario or twin file (.toml).")],
-    out: Annotated[Path, typer.Option("--out", help="Recording to write, .csv or .parquet.")],
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of everything left to chance.")] = 0,
+    scenario: Annotated[
+        str,
+        typer.Argument(
+            metavar="SCENARIO",
+            autocompletion=completion.scenarios,
+            help="Name of a scenario, or a scenario or twin file (.toml).",
+        ),
+    ],
+    out: Annotated[Path, typer.Option("--out", help="Recording to write (.csv, .parquet).")],
+    seed: Annotated[int, shared("--seed", min=0)] = 0,
     changes: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="KEY=VALUE", help="Change a key of the scenario file; may be repeated."),
     ] = None,
     raw: Annotated[bool, typer.Option("--raw", help="Keep the readings as counts of the converter.")] = False,
-    rrd: Annotated[Path | None, typer.Option("--rrd", help="Rerun recording to write.")] = None,
+    rrd: RrdOption = None,
     json: JsonOption = False,
 ) -> None:
     """Simulate a scenario on the MuJoCo turntable and write what the board would have recorded.
 
-    Example: gfimu simulate paper_run --out run.parquet --seed 1 --set sensor.range_g=8
+    Examples
+    --------
+    gfimu simulate paper_run --out run.parquet --seed 1
+    # Keys of the scenario changed
+    gfimu simulate paper_run --out run.csv --set sensor.range_g=8 --set duration_s=5
+    # With a picture for the rerun viewer
+    gfimu simulate tumble --out tumble.parquet --rrd tumble.rrd
     """
     from gfimu.commands.simulate import simulate
     from sim.scenarios import Scenario, summarise

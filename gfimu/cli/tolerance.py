@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gfimu.cli.output import JsonOption, print_json, print_paths, print_table, print_text, progress
+from gfimu.cli import completion
+from gfimu.cli.output import print_json, print_paths, print_table, print_text, progress
+from gfimu.cli.shared_options import JsonOption, PictureOption, shared
 
 if TYPE_CHECKING:
     from gfimu.commands.tolerance import ToleranceResult
@@ -24,21 +25,34 @@ def register(app: typer.Typer) -> None:
 
 
 def _tolerance(
-    array: Annotated[str, typer.Argument(help="Array as drawn: a name, a TOML file, or an MJCF file with sites.")],
+    array: Annotated[
+        str,
+        typer.Argument(
+            metavar="ARRAY",
+            autocompletion=completion.arrays,
+            help="Array as drawn: a name, a TOML file, or an MJCF file with sites.",
+        ),
+    ],
     scenario: Annotated[
-        str | None,
-        typer.Option(help="Motion: a scenario by name or file; by default rest, then a spin about the vertical."),
+        str | None, shared("--scenario", when="Motion. ", more="; by default rest, then a spin about the vertical")
     ] = None,
-    time: Annotated[float | None, typer.Option(help="Length of the run, s; 3, or that of the scenario.")] = None,
-    rate: Annotated[float, typer.Option(help="Rate of the default motion, rad/s.")] = 5.0,
-    placement_mm: Annotated[float, typer.Option(help="Limit ± of each chip's place along each axis, mm.")] = 0.2,
+    duration: Annotated[float | None, shared("--duration", more="; 3, or that of the scenario")] = None,
+    speed_rad_s: Annotated[float, shared("--speed-rad-s", more=", of the default motion")] = 5.0,
+    position_mm: Annotated[
+        float, typer.Option(metavar="MM", help="Limit ± of each chip's place along each axis, mm.")
+    ] = 0.2,
     angle_deg: Annotated[float, typer.Option(help="Limit ± of each chip's rotation about each axis, °.")] = 0.5,
     normal: Annotated[
         bool,
         typer.Option("--normal", help="Limits are 3 σ of a normal distribution; else errors are uniform between them."),
     ] = False,
-    part: Annotated[str | None, typer.Option(help="Part of every chip, in place of those of the array.")] = None,
-    bias_mg: Annotated[float | None, typer.Option(help="Bias, 1 σ, mg; else the data sheet's.")] = None,
+    part: Annotated[
+        str | None,
+        typer.Option(
+            metavar="PART", autocompletion=completion.parts, help="Part of every chip, in place of those of the array."
+        ),
+    ] = None,
+    bias_mg: Annotated[float | None, shared("--bias-mg", more="; else the data sheet's")] = None,
     gain_percent: Annotated[float | None, typer.Option(help="Gain error, 1 σ, %; else the data sheet's.")] = None,
     cross_axis_percent: Annotated[
         float | None, typer.Option(help="Pick-up of each other axis of the chip, 1 σ, %; else the data sheet's.")
@@ -46,28 +60,32 @@ def _tolerance(
     nonlinearity_percent: Annotated[
         float | None, typer.Option(help="Non-linearity at full scale, 1 σ, %; else the data sheet's.")
     ] = None,
-    noise_ug: Annotated[
-        float | None, typer.Option(help="White noise, one-sided density, µg/√Hz; else the data sheet's.")
-    ] = None,
+    noise_ug: Annotated[float | None, shared("--noise-ug", more="; else the data sheet's")] = None,
     temperature_k: Annotated[float, typer.Option(help="Temperature of the run less that of the calibration, K.")] = 5.0,
     calibrated: Annotated[
         list[str] | None,
-        typer.Option(help="none, rest, poses or poses+rest; may be repeated; all that are possible by default."),
+        typer.Option(
+            metavar="NAME",
+            autocompletion=completion.words("none", "rest", "poses", "poses+rest"),
+            help="none, rest, poses or poses+rest; may be repeated; all that are possible by default.",
+        ),
     ] = None,
     closed_form: Annotated[
         bool, typer.Option("--closed-form", help="First order alone, without simulated units.")
     ] = False,
     units: Annotated[int, typer.Option(help="Number of simulated units.")] = 200,
-    seed: Annotated[int, typer.Option(help="Seed of the simulated units.")] = 0,
-    workers: Annotated[int | None, typer.Option(help="Worker processes; all processors by default.")] = None,
-    out: Annotated[Path | None, typer.Option(help="Picture to write (.png, .svg, .pdf).")] = None,
-    as_json: JsonOption = False,
+    seed: Annotated[int, shared("--seed")] = 0,
+    workers: Annotated[int | None, shared("--workers")] = None,
+    picture: PictureOption = None,
+    json: JsonOption = False,
 ) -> None:
     """Budget what machining and chip tolerances do to α, ω and position: shares, simulated units, what to pay for.
 
-    Example: `gfimu tolerance cube12 --placement-mm 0.2 --angle-deg 0.5 --out tolerance.png`
-
-    Another part, without simulated units: `gfimu tolerance cube12 --closed-form --part adxl355 --calibrated poses+rest`
+    Examples
+    --------
+    gfimu tolerance cube12 --position-mm 0.2 --angle-deg 0.5 --picture tolerance.png
+    # Another part, without simulated units
+    gfimu tolerance cube12 --closed-form --part adxl355 --calibrated poses+rest
     """
     from gfimu.commands.tolerance import tolerance
 
@@ -75,9 +93,9 @@ def _tolerance(
         result = tolerance(
             array,
             scenario=scenario,
-            time=time,
-            rate=rate,
-            placement_mm=placement_mm,
+            duration=duration,
+            speed_rad_s=speed_rad_s,
+            position_mm=position_mm,
             angle_deg=angle_deg,
             normal=normal,
             part=part,
@@ -92,15 +110,15 @@ def _tolerance(
             units=units,
             seed=seed,
             workers=workers,
-            out=out,
+            picture=picture,
             progress=advance,
         )
-    if as_json:
-        print_json(result.to_dict() | {"files": {} if out is None else {"picture": out}})
+    if json:
+        print_json(result.to_dict() | {"files": {} if picture is None else {"picture": picture}})
         return
     _print(result)
-    if out is not None:
-        print_paths([("picture", out)])
+    if picture is not None:
+        print_paths([("picture", picture)])
 
 
 def _print(result: ToleranceResult) -> None:
@@ -180,7 +198,7 @@ def _print_calibration(result: ToleranceResult, calibration: str) -> None:
     if budget.attitude_rad > TILT_LIMIT:
         print_text(
             f"  The attitude error reaches {budget.attitude_rad:.2g} rad (1 σ per axis); position is of first order up "
-            f"to {TILT_LIMIT} rad: calibrate, or give a shorter --time.",
+            f"to {TILT_LIMIT} rad: calibrate, or give a shorter --duration.",
             style="yellow",
         )
     for reason, count in result.units[calibration].failures.items() if result.units else ():

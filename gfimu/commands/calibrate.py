@@ -13,10 +13,11 @@ from gfimu.files.outputs import CALIBRATION, PICTURE, writes
 if TYPE_CHECKING:
     from gfimu.calibration.registry import CalibrationMethod
     from gfimu.calibration.result import Calibration
+    from gfimu.commands.opened import Source
     from gfimu.geometry.array import AccelerometerArray
     from gfimu.importing import ColumnMap
     from gfimu.recording import Recording
-    from gfimu.recording.mapped import MappedFile
+    from gfimu.recording.mapped import RecordingLike
 
 __all__ = ["calibrate"]
 
@@ -42,7 +43,7 @@ _OPTION_NAMES = {
 )
 def calibrate(
     method: str,
-    recording: Recording | str | Path | MappedFile,
+    recording: RecordingLike,
     *,
     out: str | Path | None = None,
     array: AccelerometerArray | str | Path | None = None,
@@ -58,16 +59,16 @@ def calibrate(
     rest_threshold: float | None = None,
     min_rest: float | None = None,
     levelling_std: float | None = None,
-    motion: Recording | str | Path | MappedFile | None = None,
+    motion: RecordingLike | None = None,
     update: Calibration | str | Path | None = None,
     turn_on_std: float | None = None,
     bias_walk: float | None = None,
     calibration: Calibration | str | Path | None = None,
     radius_std: float | None = None,
     stretch_std: float | None = None,
-    check: Recording | str | Path | MappedFile | None = None,
+    check: RecordingLike | None = None,
     rate_table: bool = False,
-    also: Sequence[Recording | str | Path | MappedFile] = (),
+    also: Sequence[RecordingLike] = (),
     table_axes: Sequence[str] | str = (),
     picture: str | Path | None = None,
     force: bool = False,
@@ -82,7 +83,7 @@ def calibrate(
     ----------
     method : str
         A key of `gfimu.calibration.registry.METHODS`.
-    recording : Recording, str or Path
+    recording : Recording, path, table, or times (n,) with readings (n, c)
         Static poses in m/s² or raw counts, or the file.
     out : str or Path, optional
         Calibration file to write, ``.json``.
@@ -123,7 +124,7 @@ def calibrate(
         For ``spin``: standard deviations of each coordinate of a chip, m, and of the arm stretch, s²/rad²
         (`gfimu.calibration.spin.policy`).
     check : Recording, str or Path, optional
-        Other poses at rest, which the fit does not see: |a| − g on them goes into the statistics
+        Other poses at rest, which the fit does not see: ``|a| − g`` on them goes into the statistics
         (`gfimu.calibration.check_poses`).
     rate_table : bool
         For ``gyro``: the recording is of a rate table, whose rate (``tacho_rad_s``) is the reference
@@ -149,7 +150,7 @@ def calibrate(
     from gfimu.calibration.check_poses import check_on_poses
     from gfimu.calibration.methods import CalibrationTask, RateTable, run_calibration
     from gfimu.calibration.registry import calibration_method
-    from gfimu.commands.opened import as_array, as_calibration, by_map, name_of
+    from gfimu.commands.opened import as_array, as_calibration, as_source, name_of
     from gfimu.recording.checks import examine
 
     on_table = rate_table or bool(also) or bool(table_axes)
@@ -174,7 +175,7 @@ def calibrate(
         raise InputError("--turn-on-std and --bias-walk are of --update; give the calibration to carry over")
     drawing = None if array is None else as_array(array)
     local_gravity = _gravity(gravity, latitude, height)
-    source = by_map(recording, column_map, map_set)
+    source = as_source(recording, array, column_map, map_set)
     if on_table or "rate_table" in chosen.options:
         if check is not None or picture is not None or drawing is not None or gravity is not None:
             raise InputError(
@@ -187,7 +188,7 @@ def calibrate(
             levelling_std_rad=levelling,
             latitude_deg=latitude,
             rate_table=RateTable(
-                tuple(_references(by_map(one, column_map, map_set)) for one in also),
+                tuple(_references(as_source(one, array, column_map, map_set)) for one in also),
                 tuple(filter(None, table_axes.split(","))) if isinstance(table_axes, str) else tuple(table_axes),
                 tuple(name_of(one) for one in (recording, *also)),
             ),
@@ -198,10 +199,10 @@ def calibrate(
         return result
     run = _uncalibrated(source, drawing)
     examine(run, drawing, source=name_of(recording), force=force)
-    turned = None if motion is None else _uncalibrated(by_map(motion, column_map, map_set), drawing)
+    turned = None if motion is None else _uncalibrated(as_source(motion, array, column_map, map_set), drawing)
     if turned is not None:
         examine(turned, drawing, source=name_of(motion), force=force)
-    others = None if check is None else _uncalibrated(by_map(check, column_map, map_set), drawing)
+    others = None if check is None else _uncalibrated(as_source(check, array, column_map, map_set), drawing)
     if others is not None:
         examine(others, drawing, source=name_of(check), force=force)
         _refuse_the_same(run, others, name_of(check))
@@ -256,21 +257,21 @@ def _refuse_unused(method: CalibrationMethod, **given: object) -> None:
             raise InputError(f"{_OPTION_NAMES[name]}; use it with {users}, not {method.name}")
 
 
-def _uncalibrated(recording: Recording | str | Path | MappedFile, array: AccelerometerArray | None) -> Recording:
+def _uncalibrated(recording: Source, array: AccelerometerArray | None) -> Recording:
     from gfimu.calibration.run_file import open_uncalibrated
     from gfimu.recording import Recording
 
     return recording if isinstance(recording, Recording) else open_uncalibrated(recording, array=array)
 
 
-def _references(recording: Recording | str | Path | MappedFile) -> Recording:
+def _references(recording: Source) -> Recording:
     from gfimu.calibration.run_file import open_references
     from gfimu.recording import Recording
 
     return recording if isinstance(recording, Recording) else open_references(recording)
 
 
-def _own_array(recording: Recording | str | Path | MappedFile) -> AccelerometerArray:
+def _own_array(recording: Source) -> AccelerometerArray:
     from gfimu.commands.opened import as_run
 
     return as_run(recording, None)[1]

@@ -8,7 +8,10 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from numpy.typing import NDArray
+
 from gfimu.files.outputs import OutputFolder, writes
+from gfimu.results import Panel, PlottedResult, result_html
 
 if TYPE_CHECKING:
     from sim.sweep.summary import Group
@@ -17,7 +20,7 @@ __all__ = ["CampaignResult", "campaign"]
 
 
 @dataclass(frozen=True)
-class CampaignResult:
+class CampaignResult(PlottedResult):
     """What is in the folder of a campaign.
 
     Parameters
@@ -39,6 +42,33 @@ class CampaignResult:
     done: int
     failures: dict[str, int]
     groups: tuple[Group, ...]
+
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """Return one row per case that is done, with the columns of the dataset: factors, results, failure."""
+        from gfimu.files.table import as_found
+        from sim.sweep.dataset import Dataset
+
+        table = Dataset.open(self.folder).table()
+        return {name: as_found(table.column(name)) for name in table.column_names}
+
+    def _heading(self) -> str:
+        return f"Campaign in {self.folder}"
+
+    def _facts(self) -> list[tuple[str, str]]:
+        return [
+            ("cases done", f"{self.done} of {self.cases}"),
+            *((why, f"{n} failed") for why, n in self.failures.items()),
+        ]
+
+    def _repr_html_(self) -> str:
+        from gfimu.commands.campaign_views import group_columns
+
+        return result_html(self._heading(), self._facts(), group_columns(self.groups))
+
+    def _panels(self) -> list[Panel]:
+        from gfimu.commands.campaign_views import group_panels
+
+        return group_panels(self.groups)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content for JSON."""

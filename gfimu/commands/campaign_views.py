@@ -8,7 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from gfimu.files.outputs import OutputFile, writes
+from gfimu.results import Panel, PlottedResult, Series, text_column
 
 if TYPE_CHECKING:
     from sim.sweep.pace import Run
@@ -64,7 +68,7 @@ class CampaignStatus:
 
 
 @dataclass(frozen=True)
-class CampaignTable:
+class CampaignTable(PlottedResult):
     """Quantiles and sensitivities of a campaign.
 
     Parameters
@@ -81,6 +85,23 @@ class CampaignTable:
     sensitivities: tuple[Sensitivity, ...]
     seed_shares: dict[str, float]
 
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """Return one row per group and result: the factors' values, cases, quantiles 5, 50 and 95 %."""
+        return group_columns(self.groups)
+
+    def _heading(self) -> str:
+        return "Results of a campaign"
+
+    def _facts(self) -> list[tuple[str, str]]:
+        return [
+            (f"share of {one.factor} in {one.result}", f"{100 * one.first:.3g} %")
+            for one in self.sensitivities
+            if math.isfinite(one.first)
+        ]
+
+    def _panels(self) -> list[Panel]:
+        return group_panels(self.groups)
+
     def to_dict(self) -> dict[str, Any]:
         """Return the content for JSON."""
         return {
@@ -88,6 +109,38 @@ class CampaignTable:
             "sensitivities": [one.to_dict() for one in self.sensitivities],
             "seed_shares": self.seed_shares,
         }
+
+
+_PICTURE = OutputFile("a picture", (".png", ".svg", ".html"), dict.fromkeys((".png", ".svg", ".html"), ("matplotlib",)))
+
+
+def group_columns(groups: Sequence[Group]) -> dict[str, NDArray[Any]]:
+    """Return groups as columns: the factors' values, then result, cases, failed, low, median_or_share, high."""
+    factors = list(groups[0].values) if groups else []
+    columns: dict[str, NDArray[Any]] = {name: np.array([group.values[name] for group in groups]) for name in factors}
+    columns["result"] = text_column(group.result for group in groups)
+    columns |= {key: np.array([getattr(group, key) for group in groups], dtype=int) for key in ("cases", "failed")}
+    for key, name in (("low", "low"), ("median", "median_or_share"), ("high", "high")):
+        columns[name] = np.array([getattr(group, key) for group in groups], dtype=float)
+    return columns
+
+
+def group_panels(groups: Sequence[Group]) -> list[Panel]:
+    """Return one panel per result: median and quantiles 5 and 95 % of each group."""
+    panels = []
+    for result in dict.fromkeys(group.result for group in groups):
+        members = [group for group in groups if group.result == result]
+        names = tuple(", ".join(f"{key} {value}" for key, value in one.values.items()) or "all" for one in members)
+        series = tuple(
+            Series(label, np.array([getattr(one, key) for one in members], dtype=float), role=role)
+            for label, key, role in (
+                ("95 %", "high", "noise"),
+                ("median or share", "median", "after"),
+                ("5 %", "low", "noise"),
+            )
+        )
+        panels.append(Panel(result, result, series, names))
+    return panels
 
 
 @writes(reads=("folder",))
@@ -143,7 +196,7 @@ def campaign_table(folder: str | Path, *, by: Sequence[str] = (), csv: str | Pat
     return found
 
 
-@writes(reads=("folder",), out=OutputFile("a picture", (".png", ".svg", ".html")))
+@writes(reads=("folder",), out=_PICTURE)
 def campaign_plot(folder: str | Path, *, out: str | Path, result: Sequence[str] = ()) -> list[str]:
     """Draw results against each factor, and which factors cause their variance; return the names of what is drawn.
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from gfimu.calibration.result import Calibration
     from gfimu.certification.certificate import Certificate, Component, Sheet
     from gfimu.geometry.array import AccelerometerArray
-    from gfimu.recording import Recording
+    from gfimu.recording.mapped import RecordingLike
     from gfimu.uncertainty.stage import Stage
 
 __all__ = ["FOLDER", "certificate"]
@@ -34,7 +34,7 @@ def certificate(
     compare: Calibration | Certificate | str | Path | None = None,
     stage: Stage | str | Path | None = None,
     array: AccelerometerArray | str | Path | None = None,
-    rest: Recording | str | Path | None = None,
+    rest: RecordingLike | None = None,
     item: str = "",
     date: str = "",
     components: Iterable[Component] = (),
@@ -105,16 +105,17 @@ def certificate(
 def _sheet(
     calibration: Calibration,
     array: AccelerometerArray | str | Path | None,
-    rest: Recording | str | Path | None,
+    rest: RecordingLike | None,
 ) -> Sheet | None:
     """Return the sheet of the array as an angular sensor; None where neither array nor recording is given."""
     from gfimu.certification.angular import angular_sensor_sheet
-    from gfimu.commands.opened import as_array, as_calibrated_run, as_run
+    from gfimu.commands.opened import as_array, as_calibrated_run, as_run, as_source
 
     if rest is None:
         return None if array is None else angular_sensor_sheet(calibration, as_array(array))
-    corrected, _ = as_calibrated_run(rest, array, calibration)
-    return angular_sensor_sheet(calibration, as_run(rest, array)[1], rest=corrected)
+    source = as_source(rest, array)
+    corrected, _ = as_calibrated_run(source, array, calibration)
+    return angular_sensor_sheet(calibration, as_run(source, array)[1], rest=corrected)
 
 
 def _certified(

@@ -12,8 +12,7 @@ from gfimu.files.outputs import writes
 if TYPE_CHECKING:
     from gfimu.diagnosis.design.run_check import RunCheck
     from gfimu.importing import ColumnMap
-    from gfimu.recording import Recording
-    from gfimu.recording.mapped import MappedFile
+    from gfimu.recording.mapped import RecordingLike
     from gfimu.world_model import WorldModel
 
 __all__ = ["check"]
@@ -21,7 +20,7 @@ __all__ = ["check"]
 
 @writes(reads=("recordings", "twin", "column_map"))
 def check(
-    recordings: Recording | str | Path | MappedFile | Sequence[Recording | str | Path | MappedFile],
+    recordings: RecordingLike | Sequence[RecordingLike],
     twin: WorldModel | str | Path,
     *,
     column_map: ColumnMap | str | Path | None = None,
@@ -31,7 +30,7 @@ def check(
 
     Parameters
     ----------
-    recordings : Recording, path, or sequence of these
+    recordings : Recording, path, table, (times, readings), or sequence of these
         Runs of one rig.
     twin : WorldModel, str or Path
         What the simulation believes: a twin, its name or file, or a simulation of one's own (``rig.py:function``).
@@ -45,13 +44,13 @@ def check(
     InputError
         If a recording can't be read, is too short, or lacks the reference that drives the twin.
     """
-    from gfimu.commands.opened import as_runs, as_twin, by_map
+    from gfimu.commands.opened import as_runs, as_source, as_twin
     from gfimu.diagnosis.design.run_check import check_runs
     from gfimu.recording import Recording
     from gfimu.recording.formats import open_recording
 
     model = as_twin(twin)
-    given = [by_map(one, column_map, map_set) for one in as_runs(recordings)]
+    given = [as_source(one, model.array, column_map, map_set) for one in as_runs(recordings)]
     read = [one if isinstance(one, Recording) else open_recording(one, array=model.array) for one in given]
     names = [
         Path(one).name if isinstance(one, str | os.PathLike) else f"run {number}"

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from gfimu.geometry.array import AccelerometerArray
     from gfimu.importing import ColumnMap
     from gfimu.recording import Recording
-    from gfimu.recording.mapped import MappedFile
+    from gfimu.recording.mapped import RecordingLike
     from gfimu.sensor_noise import RecordingNoise
 
 __all__ = ["convert"]
@@ -23,7 +23,7 @@ __all__ = ["convert"]
 
 @writes(reads=("source", "array", "column_map", "noise"), target=EXPORT)
 def convert(
-    source: Recording | Calibration | AccelerometerArray | str | Path | MappedFile | Sequence[str | Path],
+    source: RecordingLike | Calibration | AccelerometerArray | Sequence[str | Path],
     target: str | Path | None = None,
     *,
     array: AccelerometerArray | str | Path | None = None,
@@ -42,7 +42,7 @@ def convert(
 
     Parameters
     ----------
-    source : Recording, Calibration, AccelerometerArray, str, Path or MappedFile
+    source : Recording, Calibration, AccelerometerArray, path, table, or times (n,) with readings (n, c)
         A calibration, or its ``.json`` file; an array, or its ``.toml`` file; or a recording, or its file: CSV,
         Parquet, a MIMU4444 stream, or a foreign file with its column map; one file per chip on a common clock, with a
         map.
@@ -83,7 +83,7 @@ def convert(
     """
     from gfimu.commands.export_array import export_array
     from gfimu.commands.export_calibration import export_calibration
-    from gfimu.commands.opened import as_array, by_map, files_by_map, name_of
+    from gfimu.commands.opened import as_array, as_source, files_by_map, name_of
     from gfimu.recording import Recording
     from gfimu.recording.carried_array import carried_array
     from gfimu.recording.checks import examine
@@ -107,13 +107,15 @@ def convert(
     given = _given(source)
     changes = [*map_set, *_dropping(drop)]
     if isinstance(given[0], Recording | MappedFile):
-        given = [by_map(given[0], None, changes), *given[1:]]
+        given = [as_source(given[0], map_set=changes), *given[1:]]
+    elif not isinstance(given[0], str | Path):
+        given = [as_source(given[0], drawing, column_map, changes), *given[1:]]
     elif column_map is not None or changes:
         files = [one for one in given if isinstance(one, str | Path)]
         given = [files_by_map(files, column_map, table, changes)]
     if len(given) > 1:
         raise InputError(f"{given[1]}: several files need --map, which says what the columns of each chip's file are")
-    recording = given[0] if isinstance(given[0], Recording) else open_recording(given[0], array=drawing)
+    recording = given[0] if isinstance(given[0], Recording) else open_recording(as_source(given[0]), array=drawing)
     if recording.unit == "m_s2":
         examine(recording, drawing, source=name_of(given[0]), force=True)  # a conversion is how a file is mended
     if drawing is not None:
@@ -172,7 +174,10 @@ def _calibration(source: object) -> Calibration | None:
 
 
 def _given(
-    source: Recording | Calibration | AccelerometerArray | str | Path | MappedFile | Sequence[str | Path],
-) -> list[Recording | str | Path | MappedFile]:
+    source: RecordingLike | Calibration | AccelerometerArray | Sequence[str | Path],
+) -> list[RecordingLike]:
     """Return one source or several as a list."""
-    return list(source) if isinstance(source, list | tuple) else [source]  # type: ignore[list-item]
+    from gfimu.commands.opened import is_arrays
+
+    several = isinstance(source, list | tuple) and not is_arrays(source)
+    return list(source) if several else [source]  # type: ignore[arg-type, list-item]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from gfimu.commands.diagnose import FOLDER as DIAGNOSIS
 from gfimu.files.outputs import OutputFolder, check_outputs, writes
+from gfimu.optional_packages import require
 
 if TYPE_CHECKING:
     from gfimu.commands.demo_steps import Row
@@ -66,6 +67,7 @@ def demo(
     InputError
         If the folder can't be written.
     """
+    require("gfimu demo", "mujoco", "rerun", "matplotlib")
     from gfimu.commands.demo_steps import STEPS, Demo
 
     folder = Path(out)

@@ -289,7 +289,7 @@ def draw_run(demo: Demo) -> None:
 
 def diagnose_hidden(demo: Demo) -> None:
     """Hide a tilted table and an eccentric cube in the world, and diagnose the recording."""
-    from gfimu.commands.diagnose import write_result
+    from gfimu.commands.diagnose import write_report
     from gfimu.diagnosis.diagnose import diagnose
     from sim.effects import make_effect
     from sim.scenarios import Scenario, simulate
@@ -311,8 +311,7 @@ def diagnose_hidden(demo: Demo) -> None:
     recording = simulate(calibrated, seed=demo.seed, out=demo.out / "hidden.parquet")
     twin = Twin.load(_TWIN)  # believes in a level table with the cube on its axis
     found = diagnose([recording], twin, names=["hidden.parquet"])
-    written = write_result(demo.out / "diagnosis", found, recording)
-    demo.written["diagnosis report"] = written["report"]
+    demo.written["diagnosis report"] = write_report(found, demo.out / "diagnosis")
     causes = {cause.effect: cause for cause in found.causes}
     for name, unit, factor, what in (
         ("table_tilt", "°", 180 / np.pi, "hidden tilt of the table, found"),

@@ -17,8 +17,7 @@ if TYPE_CHECKING:
     from gfimu.diagnosis.design.profile_search import Limits
     from gfimu.diagnosis.design.proposal import Proposal
     from gfimu.importing import ColumnMap
-    from gfimu.recording import Recording
-    from gfimu.recording.mapped import MappedFile
+    from gfimu.recording.mapped import RecordingLike
     from gfimu.world_model import Effect, WorldModel
 
 __all__ = ["design"]
@@ -30,7 +29,7 @@ def design(
     effects: Sequence[str | Effect] = (),
     *,
     verdict: str | Path | None = None,
-    run: Recording | str | Path | MappedFile | Sequence[Recording | str | Path | MappedFile] = (),
+    run: RecordingLike | Sequence[RecordingLike] = (),
     column_map: ColumnMap | str | Path | None = None,
     map_set: Sequence[str] = (),
     max_rate: float = 15.0,
@@ -96,7 +95,7 @@ def design(
     """
     import numpy as np
 
-    from gfimu.commands.opened import as_runs, as_twin, by_map
+    from gfimu.commands.opened import as_runs, as_source, as_twin
     from gfimu.diagnosis.data.run import prepare_run
     from gfimu.diagnosis.design.ambiguity import open_effects
     from gfimu.diagnosis.design.design import MOUNTINGS, Limits
@@ -115,7 +114,9 @@ def design(
             model,
             name=str(item) if isinstance(item, str | os.PathLike) else f"run {number}",
         )
-        for number, item in enumerate((by_map(one, column_map, map_set) for one in as_runs(run)), start=1)
+        for number, item in enumerate(
+            (as_source(one, model.array, column_map, map_set) for one in as_runs(run)), start=1
+        )
     ]
     proposal = propose(
         model,

@@ -3,23 +3,32 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from gfimu.errors import InputError
 from gfimu.files.outputs import OutputFolder, same_file, writes
+from gfimu.optional_packages import missing
 
 if TYPE_CHECKING:
     from gfimu.calibration.result import Calibration
+    from gfimu.commands.opened import Source
+    from gfimu.diagnosis.report.rig import DrawnRig
     from gfimu.diagnosis.verdict.verdict import Diagnosis
     from gfimu.importing import ColumnMap
     from gfimu.joining import Joined
     from gfimu.recording import Recording
-    from gfimu.recording.mapped import MappedFile
+    from gfimu.recording.mapped import RecordingLike
+    from gfimu.visual.scene import Shape
     from gfimu.world_model import WorldModel
+    from sim.twin import Twin
+    from sim.world import World
 
-__all__ = ["FOLDER", "diagnose", "write_result"]
+__all__ = ["FOLDER", "diagnose", "write_report"]
 
 EXPLAINED = frozenset({"sign", "exchange", "dead", "rest_bias"})
 """Findings of a recording's checks that are effects of the library: the diagnosis explains them."""
@@ -30,11 +39,11 @@ FOLDER = OutputFolder(("verdict.json", "twin.toml", "report.html", "diagnosis.rr
 
 @writes(reads=("recordings", "twin", "held_out", "calibration", "column_map", "reference", "reference_map"), out=FOLDER)
 def diagnose(
-    recordings: Recording | str | Path | MappedFile | Sequence[Recording | str | Path | MappedFile],
+    recordings: RecordingLike | Sequence[RecordingLike],
     twin: WorldModel | str | Path,
     *,
     out: str | Path | None = None,
-    held_out: Recording | str | Path | MappedFile | Sequence[Recording | str | Path | MappedFile] = (),
+    held_out: RecordingLike | Sequence[RecordingLike] = (),
     calibration: Calibration | str | Path | None = None,
     column_map: ColumnMap | str | Path | None = None,
     map_set: Sequence[str] = (),
@@ -50,14 +59,15 @@ def diagnose(
 
     Parameters
     ----------
-    recordings : Recording, path, or sequence of these
+    recordings : Recording, path, table, (times, readings), or sequence of these
         Runs of one rig, fitted together.
     twin : WorldModel, str or Path
         What the simulation believes: a twin, its name or file; or a simulation of one's own, as such or as
         ``rig.py:function`` (`gfimu.own_rig.load_model`).
     out : str or Path, optional
-        Folder for ``verdict.json``, ``twin.toml``, ``report.html`` and ``diagnosis.rrd``; made if it isn't there.
-    held_out : Recording, path, or sequence of these
+        Folder for ``verdict.json``, ``twin.toml``, ``report.html`` and ``diagnosis.rrd``; made if it isn't there. A
+        file whose package is not installed is left out, with a warning before the work begins.
+    held_out : as recordings
         Recordings kept for measuring the gain.
     calibration : Calibration, str or Path, optional
         Calibration of the unit, applied first.
@@ -92,14 +102,20 @@ def diagnose(
         If a recording is too short, lacks the reference that drives the twin, is refused by its checks, or is held
         out and fitted both; or the folder can't be written.
     """
-    from gfimu.commands.opened import as_calibration, as_runs, as_twin, by_map
+    from gfimu.commands.opened import as_calibration, as_runs, as_source, as_twin
     from gfimu.joining import displaced_reference
     from gfimu.recording.checks import examine
 
-    runs, unseen = ([by_map(run, column_map, map_set) for run in as_runs(group)] for group in (recordings, held_out))
+    if out is not None:
+        from gfimu.diagnosis.report.folder import warn_of_omitted
+
+        warn_of_omitted()
+    given = as_twin(twin)
+    runs, unseen = (
+        [as_source(run, given.array, column_map, map_set) for run in as_runs(group)] for group in (recordings, held_out)
+    )
     _refuse_fitted(runs, unseen)
-    model = as_twin(twin)
-    model = model.searching(wide=True) if grammar else model
+    model = given.searching(wide=True) if grammar else given
     unit = None if calibration is None else as_calibration(calibration)
     read, kept = ([_opened(run, model, unit) for run in group] for group in (runs, unseen))
     if unit is not None and unit.positions:
@@ -114,10 +130,12 @@ def diagnose(
 
         clocks[0] = join(read[0], reference, reference_map=reference_map, reference_map_set=reference_map_set)
     found, used = _explained(read, clocks, model, reference is not None, kept, labels, report, force)
+    x, y, z = used.mounting_rotvec.tolist()
+    found = replace(found, mounting_rotvec_rad=(x, y, z))
     if out is not None:
         if report is not None:
             report(0.99, "write the report")
-        write_result(out, found, used)
+        write_report(found, out)
     return found
 
 
@@ -159,38 +177,69 @@ def _explained(
     return with_reference_clock(found, first.clock, corrected, model), used[0]
 
 
-def write_result(out: str | Path, found: Diagnosis, recording: Recording) -> dict[str, Path]:
-    """Write the folder of a diagnosis; the rig of an extended `sim.twin.Twin` is drawn by its MuJoCo model."""
+@writes(folder=FOLDER)
+def write_report(diagnosis: Diagnosis, folder: str | Path) -> Path:
+    """Write the folder of a diagnosis: verdict, extended twin, ``report.html`` and a rerun recording.
+
+    The rig of an extended `sim.twin.Twin` is drawn by its MuJoCo model where mujoco and rerun-sdk are installed.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        What `gfimu.diagnose` returned.
+    folder : str or Path
+        Folder to write; made if it isn't there, in one that is.
+
+    Returns
+    -------
+    Path
+        The report, for a browser; ``verdict.json`` where the packages of the report are not installed.
+
+    Raises
+    ------
+    InputError
+        If the folder can't be written.
+    """
     import tomli_w
 
     from gfimu.diagnosis.report.folder import write_diagnosis
-    from gfimu.diagnosis.report.rig import DrawnRig
     from gfimu.files.model_files import list_models
-    from sim.drawing import rig_drawing
     from sim.twin import Twin
 
-    twin = found.twin
+    twin = diagnosis.twin
     if not isinstance(twin, Twin):
-        return write_diagnosis(out, found, twin_toml=twin.to_toml())
-    world = twin.world(mounting=recording.mounting_rotvec)
+        written = write_diagnosis(folder, diagnosis, twin_toml=twin.to_toml())
+        return written.get("report", written["verdict"])
     content = twin.to_dict()
     more = {}
     if twin.array_name not in list_models("arrays"):
         # An array file of the user's, and a calibrated one, is named relative to the twin file: it moves with it.
         content["array"] = "array.toml"
         more["array.toml"] = twin.array.to_toml()
-    return write_diagnosis(
-        out,
-        found,
-        twin_toml=tomli_w.dumps(content),
-        more=more,
-        rig=DrawnRig(
-            world.mount_rotvec,
-            world.cube_offset,
-            None if twin.drive_source == "gyro" or world.slide is not None else rig_drawing(world),
-            world.slide,
-        ),
-    )
+    rig = drawn_rig(diagnosis)
+    written = write_diagnosis(folder, diagnosis, twin_toml=tomli_w.dumps(content), more=more, rig=rig)
+    return written.get("report", written["verdict"])
+
+
+def drawn_rig(diagnosis: Diagnosis) -> DrawnRig | None:
+    """Return how the array of a diagnosis stood on its rig, for pictures; None for a simulation of one's own."""
+    from gfimu.diagnosis.report.rig import DrawnRig
+    from sim.twin import Twin
+
+    twin = diagnosis.twin
+    if not isinstance(twin, Twin):
+        return None
+    world = twin.world(mounting=np.array(diagnosis.mounting_rotvec_rad))
+    return DrawnRig(world.mount_rotvec, world.cube_offset, _shapes(twin, world), world.slide)
+
+
+def _shapes(twin: Twin, world: World) -> Mapping[str, Sequence[Shape]] | None:
+    """Return the shapes of the rig; None where it has none of its own, or is not drawn here."""
+    if twin.drive_source == "gyro" or world.slide is not None or missing("mujoco", "rerun"):
+        return None
+    from sim.drawing import rig_drawing
+
+    return rig_drawing(world)
 
 
 def _refuse_fitted(fitted: Sequence[object], held_out: Sequence[object]) -> None:
@@ -210,7 +259,7 @@ def _by_tacho(recording: Recording) -> bool:
     return "tacho_rad_s" in recording.reference and "gyro_x_rad_s" not in recording.reference
 
 
-def _opened(recording: Recording | str | Path | MappedFile, model: WorldModel, unit: Calibration | None) -> Recording:
+def _opened(recording: Source, model: WorldModel, unit: Calibration | None) -> Recording:
     """Return a recording with the channels of the twin's array, calibrated where there is a calibration."""
     from gfimu.calibration.run_file import open_calibrated_run
     from gfimu.recording import Recording
@@ -223,7 +272,7 @@ def _opened(recording: Recording | str | Path | MappedFile, model: WorldModel, u
     return open_calibrated_run(recording, unit, model.array)[0]
 
 
-def _names(runs: Sequence[Recording | str | Path | MappedFile]) -> list[str]:
+def _names(runs: Sequence[Source]) -> list[str]:
     """Return names for people: file names where they distinguish the runs."""
     paths = [Path(run) if isinstance(run, str | os.PathLike) else None for run in runs]
     short = [path.name if path is not None else f"run {number}" for number, path in enumerate(paths, start=1)]

@@ -8,7 +8,12 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from gfimu.commands.former_arguments import former_arguments
 from gfimu.errors import InputError
+from gfimu.results import Panel, PlottedResult, Series, TableResult, text_column
 
 if TYPE_CHECKING:
     from gfimu.geometry.array import AccelerometerArray
@@ -21,7 +26,7 @@ __all__ = ["Drift", "EquivalentErrors", "axis_drift", "drift", "drift_from_posit
 
 
 @dataclass(frozen=True)
-class Drift:
+class Drift(PlottedResult):
     """Position drift: the closed forms, and the Monte Carlo where one was asked for.
 
     Parameters
@@ -38,6 +43,36 @@ class Drift:
     sample: DriftSample | None
     seed: int
 
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """Return the columns of the budget, one row per cause."""
+        return self.budget.to_columns()
+
+    def _heading(self) -> str:
+        return self.budget._heading()
+
+    def _facts(self) -> list[tuple[str, str]]:
+        facts = self.budget._facts()
+        if self.sample is not None:
+            std = ", ".join(f"{one:.3g}" for one in self.sample.std[-1])
+            relative = 100.0 * self.sample.relative_sampling_error
+            facts.append((f"Monte Carlo, {self.sample.runs} runs", f"({std}) m, each ± {relative:.2g} %"))
+        return facts
+
+    def _notes(self) -> tuple[str, ...]:
+        return self.budget._notes()
+
+    def _panels(self) -> list[Panel]:
+        panels = self.budget._panels()
+        if self.sample is not None:
+            found = self.sample
+            series = tuple(
+                Series(axis, found.std[:, place], found.std[:, place] * found.relative_sampling_error, role=axis)
+                for place, axis in enumerate("xyz")
+            )
+            title = f"position error of {found.runs} simulated runs"
+            panels.append(Panel(title, "σ, m", series, found.t_s, "time, s", scale="zero"))
+        return panels
+
     def to_dict(self) -> dict[str, Any]:
         """Return the content of ``gfimu drift --json``."""
         result: dict[str, Any] = self.budget.to_dict()
@@ -53,7 +88,7 @@ class Drift:
 
 
 @dataclass(frozen=True)
-class EquivalentErrors:
+class EquivalentErrors(TableResult):
     """The constant errors that would explain a position error of a unit at rest.
 
     Parameters
@@ -84,15 +119,29 @@ class EquivalentErrors:
     earth_rate_deg_h: float | None
     earth_share_m: float | None
 
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """Return one row per axis: position error, bias of p and rate drift that would explain it."""
+        return {
+            "axis": text_column("xyz"),
+            "position_m": np.array(self.position_m),
+            "left_m": np.array(self.left_m),
+            "bias_mg": np.array(self.bias_mg),
+            "rate_drift_deg_h": np.array(self.rate_drift_deg_h),
+        }
+
+    def _heading(self) -> str:
+        return f"Errors that would explain the position after {self.time_s:g} s"
+
     def to_dict(self) -> dict[str, Any]:
         """Return the content of ``gfimu drift --from-position --json``."""
         return asdict(self)
 
 
+@former_arguments(time="duration")
 def drift_from_position(
     from_position: tuple[float, float, float],
     *,
-    time: float = 30.0,
+    duration: float = 30.0,
     known_bias_mg: tuple[float, float, float] = (0.0, 0.0, 0.0),
     latitude: float | None = None,
     gravity: float = 9.80665,
@@ -102,8 +151,8 @@ def drift_from_position(
     Parameters
     ----------
     from_position : tuple of float
-        Position error x, y, z after the time, m; the axes are level, z is up (``--from-position``).
-    time : float
+        Position error x, y, z after the duration, m; the axes are level, z is up (``--from-position``).
+    duration : float
         Time since the start of navigation, s.
     known_bias_mg : tuple of float
         Bias of p that is known, such as table 1 of the GF-IMU paper, mg; its ½ b t² is taken off first.
@@ -115,7 +164,7 @@ def drift_from_position(
     Raises
     ------
     InputError
-        If the time is not positive or the latitude out of range.
+        If the duration is not positive or the latitude out of range.
 
     Notes
     -----
@@ -127,16 +176,16 @@ def drift_from_position(
     from gfimu.units import STANDARD_GRAVITY
 
     mg = 1e-3 * STANDARD_GRAVITY
-    bias = equivalent_p_bias(from_position, time) / mg
-    left = tuple(r - 0.5 * b * mg * time**2 for r, b in zip(from_position, known_bias_mg, strict=True))
-    along_x, along_y, _ = (float(one) for one in equivalent_rate_drift(left, time, gravity=gravity))
+    bias = equivalent_p_bias(from_position, duration) / mg
+    left = tuple(r - 0.5 * b * mg * duration**2 for r, b in zip(from_position, known_bias_mg, strict=True))
+    along_x, along_y, _ = (float(one) for one in equivalent_rate_drift(left, duration, gravity=gravity))
     earth = share = None
     if latitude is not None:
         rate = EarthRotation(latitude).horizontal_rate  # rad/s
-        earth, share = math.degrees(rate) * 3600.0, gravity * rate * time**3 / 6.0
+        earth, share = math.degrees(rate) * 3600.0, gravity * rate * duration**3 / 6.0
     return EquivalentErrors(
         position_m=tuple(map(float, from_position)),  # type: ignore[arg-type]
-        time_s=time,
+        time_s=duration,
         known_bias_mg=tuple(map(float, known_bias_mg)),  # type: ignore[arg-type]
         left_m=left,  # type: ignore[arg-type]
         bias_mg=tuple(map(float, bias)),  # type: ignore[arg-type]
@@ -146,15 +195,16 @@ def drift_from_position(
     )
 
 
+@former_arguments(time="duration", rate="speed_rad_s")
 def drift(
     array: AccelerometerArray | str | Path = "cube12",
     *,
-    time: float = 30.0,
+    duration: float = 30.0,
     bias_mg: float = 0.0,
     noise_ug: float = 0.0,
     walk_ug: float = 0.0,
     rate_drift_deg_h: float = 0.0,
-    rate: float = 0.0,
+    speed_rad_s: float = 0.0,
     offset: tuple[float, float] = (0.0, 0.0),
     gravity: float = 9.80665,
     monte_carlo: int = 0,
@@ -167,14 +217,14 @@ def drift(
     ----------
     array : AccelerometerArray, str or Path
         The array, its name or file.
-    time : float
+    duration : float
         Time since the start of navigation, s.
     bias_mg, noise_ug, walk_ug : float
         Per channel: standard deviation of the constant bias, mg; one-sided density of the white noise, µg/√Hz; random
         walk of the bias, µg/√s.
     rate_drift_deg_h : float
         Constant error of the angular rate per axis, °/h.
-    rate : float
+    speed_rad_s : float
         Rate of the table about the vertical, rad/s; 0 is at rest.
     offset : tuple of float
         Horizontal place of the unit off the axis, m.
@@ -204,16 +254,16 @@ def drift(
         raise InputError(f"--monte-carlo {monte_carlo}: give 0 for none, or 2 or more runs")
     sources = _sources(bias_mg, noise_ug, walk_ug, rate_drift_deg_h)
     geometry = as_array(array)
-    budget = drift_budget(geometry, time, sources, rate=rate, offset=offset, gravity=gravity)
+    budget = drift_budget(geometry, duration, sources, rate=speed_rad_s, offset=offset, gravity=gravity)
     sample = None
     if monte_carlo:
         sample = monte_carlo_drift(
             geometry,
-            time,
+            duration,
             sources,
             runs=monte_carlo,
             rng=np.random.default_rng(seed),
-            rate=rate,
+            rate=speed_rad_s,
             offset=offset,
             gravity=gravity,
             progress=progress,
@@ -221,6 +271,7 @@ def drift(
     return Drift(budget, sample, seed)
 
 
+@former_arguments(time="duration", rate="speed_rad_s")
 def axis_drift(
     array: AccelerometerArray | str | Path,
     *,
@@ -228,11 +279,11 @@ def axis_drift(
     axis_point: Sequence[float] = (0.0, 0.0, 0.0),
     hub: str = "fixed",
     inclination_rad: float | None = None,
-    time: float = 30.0,
+    duration: float = 30.0,
     bias_mg: float = 0.0,
     noise_ug: float = 0.0,
     walk_ug: float = 0.0,
-    rate: float = 0.0,
+    speed_rad_s: float = 0.0,
     hub_noise_m_s2_rthz: float = 0.1,
 ) -> AxisDrift:
     """Budget the drift of rate and angle about a known axis, for as few as one chip.
@@ -252,8 +303,8 @@ def axis_drift(
         Angle between that axis and the vertical, rad; upright by default.
     hub_noise_m_s2_rthz : float
         Of a free hub, one-sided density of its own specific force, m/s²/√Hz.
-    time, bias_mg, noise_ug, walk_ug, rate
-        As of `drift`; ``rate`` about the axis.
+    duration, bias_mg, noise_ug, walk_ug, speed_rad_s
+        As of `drift`; ``speed_rad_s`` about the axis.
 
     Raises
     ------
@@ -272,11 +323,11 @@ def axis_drift(
     return drift_about(
         geometry,
         turning,
-        time,
+        duration,
         bias=sources.bias,
         noise_density=sources.noise_density,
         bias_random_walk=sources.bias_random_walk,
-        rate_rad_s=rate,
+        rate_rad_s=speed_rad_s,
         hub_density=hub_noise_m_s2_rthz,
     )
 

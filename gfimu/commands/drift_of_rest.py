@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from gfimu.commands.former_arguments import former_arguments
 from gfimu.files.outputs import PICTURE, writes
 
 if TYPE_CHECKING:
@@ -13,18 +14,18 @@ if TYPE_CHECKING:
     from gfimu.geometry.array import AccelerometerArray
     from gfimu.importing import ColumnMap
     from gfimu.position_drift.rest_windows import RestDrift
-    from gfimu.recording import Recording
-    from gfimu.recording.mapped import MappedFile
+    from gfimu.recording.mapped import RecordingLike
 
 __all__ = ["drift_of_rest"]
 
 
+@former_arguments(time="duration")
 @writes(reads=("recording", "array", "calibration", "column_map"), picture=PICTURE)
 def drift_of_rest(
-    recording: Recording | str | Path | MappedFile,
+    recording: RecordingLike,
     array: AccelerometerArray | str | Path | None = None,
     *,
-    time: float = 30.0,
+    duration: float = 30.0,
     lead: float = 10.0,
     gravity: float = 9.80665,
     calibration: Calibration | str | Path | None = None,
@@ -37,11 +38,11 @@ def drift_of_rest(
 
     Parameters
     ----------
-    recording : Recording, str or Path
-        The recording, or its file, with a rest of ``lead + time`` or more.
+    recording : Recording, path, table, or times (n,) with readings (n, c)
+        The recording, or its file, with a rest of ``lead + duration`` or more.
     array : AccelerometerArray, str or Path, optional
         The array, its name or file; the recording's own by default.
-    time, lead : float
+    duration, lead : float
         Time of navigation, and of the rest before it from which tilt and biases are read off, s.
     gravity : float
         Local gravity, m/s².
@@ -63,15 +64,15 @@ def drift_of_rest(
     GeometryError
         If the array can't see all six motions.
     """
-    from gfimu.commands.opened import as_calibrated_run, by_map, name_of
+    from gfimu.commands.opened import as_calibrated_run, as_source, name_of
     from gfimu.errors import naming
     from gfimu.position_drift.rest_windows import rest_drift
     from gfimu.recording.checks import examine
 
-    run, geometry = as_calibrated_run(by_map(recording, column_map, map_set), array, calibration)
+    run, geometry = as_calibrated_run(as_source(recording, array, column_map, map_set), array, calibration)
     examine(run, geometry, source=name_of(recording), force=force, whose="" if array is None else "the given")
     with naming(name_of(recording)):
-        found = rest_drift(run, geometry, time=time, lead=lead, gravity=gravity)
+        found = rest_drift(run, geometry, time=duration, lead=lead, gravity=gravity)
     if picture is not None:
         from gfimu.position_drift.pictures import rest_drift_picture
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from gfimu.importing import ColumnMap
     from gfimu.motion.estimation import Estimate
     from gfimu.recording import Recording
-    from gfimu.recording.mapped import MappedFile
+    from gfimu.recording.mapped import RecordingLike
 
 __all__ = ["EstimatedRun", "estimate", "estimate_run"]
 
@@ -47,7 +47,7 @@ _READS = ("recording", "array", "calibration", "column_map")
 
 @writes(reads=_READS, out=ESTIMATE, rrd=RERUN)
 def estimate(
-    recording: Recording | str | Path | MappedFile,
+    recording: RecordingLike,
     array: AccelerometerArray | str | Path | None = None,
     *,
     out: str | Path | None = None,
@@ -85,7 +85,7 @@ def estimate(
 
     Parameters
     ----------
-    recording : Recording, str or Path
+    recording : Recording, path, table, or times (n,) with readings (n, c)
         The recording, or its file.
     array : AccelerometerArray, str or Path, optional
         The array, its name or file; the recording's own by default.
@@ -177,7 +177,7 @@ def estimate(
 
 @writes(reads=_READS, out=ESTIMATE, rrd=RERUN)
 def estimate_run(
-    recording: Recording | str | Path | MappedFile,
+    recording: RecordingLike,
     array: AccelerometerArray | str | Path | None = None,
     *,
     out: str | Path | None = None,
@@ -199,14 +199,14 @@ def estimate_run(
     InputError
         As `estimate`.
     """
-    from gfimu.commands.opened import as_calibrated_run, by_map, name_of
+    from gfimu.commands.opened import as_calibrated_run, as_source, name_of
     from gfimu.errors import InputError, naming
     from gfimu.motion.estimation import estimate as solve
     from gfimu.motion.rest_bias import estimate_from_rest
     from gfimu.recording.carried_array import warn_of_other_array
     from gfimu.recording.reference_times import reference_on_rows
 
-    run, geometry = as_calibrated_run(by_map(recording, column_map, map_set), array, calibration)
+    run, geometry = as_calibrated_run(as_source(recording, array, column_map, map_set), array, calibration)
     if array is not None and calibration is None:
         warn_of_other_array(run.metadata, geometry, "the recording", whose="the given")
     run = reference_on_rows(run)

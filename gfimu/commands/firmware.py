@@ -7,8 +7,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, overload
 
+from gfimu.commands.former_arguments import former_arguments
 from gfimu.errors import InputError
 from gfimu.files.outputs import RECORDING, TRACE, OutputFolder, writes
+from gfimu.optional_packages import require
 
 if TYPE_CHECKING:
     from firmware_bridge.loop.board_process import BoardProcess
@@ -135,9 +137,7 @@ def run(
         If the emulator is not installed, an argument is wrong, the port can't be opened, or the output can't be written
         where it is asked for.
     """
-    from firmware_bridge.loop.board_process import require_emulator
-
-    require_emulator()
+    require("gfimu firmware run", "unicorn", "mujoco")
     if port is not None and out is not None:
         raise InputError("give either --port (pty or tcp:PORT) or --out (a recording)")
     ride = _ride(scenario, seed)
@@ -248,11 +248,10 @@ def trace(
     InputError
         If the emulator is not installed, or the output can't be written where it is asked for.
     """
+    require("gfimu firmware trace", "unicorn", "mujoco")
     from firmware_bridge.board.trace import write_rrd, write_vcd
     from firmware_bridge.frames.commands import sample_at
-    from firmware_bridge.loop.board_process import require_emulator
 
-    require_emulator()
     setup = sample_at(rate)
     with _board(_ride(scenario, seed), image, seed, pure_python=True, trace=True) as board:
         if skip:
@@ -276,10 +275,11 @@ def faults(*, seed: int = 0, progress: Callable[[float], None] | None = None) ->
     return run_campaign(seed=seed, progress=progress)
 
 
+@former_arguments(seconds="duration")
 def check(
     image: str | Path = "gfimu",
     *,
-    seconds: float = 3.0,
+    duration: float = 3.0,
     chips: int = 4,
     baud: int | None = None,
     time_limit: float = 60.0,
@@ -290,7 +290,7 @@ def check(
     ----------
     image : str or Path
         Image: gfimu, selfcheck, or an ELF or .bin file.
-    seconds : float
+    duration : float
         Virtual time to run, s.
     chips : int
         ADXL345s on SSP1, 0 to 4; their chip-selects are P2.0 and so on.
@@ -306,7 +306,7 @@ def check(
     """
     from firmware_bridge.strict.check import CheckOptions, check_image
 
-    return check_image(image, CheckOptions(seconds, chips, baud, time_limit))
+    return check_image(image, CheckOptions(duration, chips, baud, time_limit))
 
 
 def _ride(scenario: str | Path, seed: int) -> Ride:

@@ -13,15 +13,14 @@ if TYPE_CHECKING:
     from gfimu.crash.event import Impact
     from gfimu.geometry.array import AccelerometerArray
     from gfimu.importing import ColumnMap
-    from gfimu.recording import Recording
-    from gfimu.recording.mapped import MappedFile
+    from gfimu.recording.mapped import RecordingLike
 
 __all__ = ["impact"]
 
 
 @writes(reads=("recording", "array", "calibration", "column_map"), out=RECORDING, estimate=ESTIMATE, picture=PICTURE)
 def impact(
-    recording: Recording | str | Path | MappedFile,
+    recording: RecordingLike,
     array: AccelerometerArray | str | Path | None = None,
     *,
     cfc: float = 1000.0,
@@ -40,7 +39,7 @@ def impact(
 
     Parameters
     ----------
-    recording : Recording, str or Path
+    recording : Recording, path, table, or times (n,) with readings (n, c)
         The recording, or its file; the largest impact in it is measured.
     array : AccelerometerArray, str or Path, optional
         The array, its name or file; the recording's own by default.
@@ -78,13 +77,13 @@ def impact(
         If the recording can't be read, is refused by its checks, has gaps, is sampled too slowly for the class, holds
         no impact or begins within it, or an output can't be written where it is asked for.
     """
-    from gfimu.commands.opened import as_calibrated_run, by_map, name_of
+    from gfimu.commands.opened import as_calibrated_run, as_source, name_of
     from gfimu.crash.event import ImpactSettings, measure_impact
     from gfimu.recording.checks import examine
     from gfimu.units import STANDARD_GRAVITY
 
     settings = ImpactSettings(cfc, standard, threshold_g * STANDARD_GRAVITY, direction=direction)
-    run, geometry = as_calibrated_run(by_map(recording, column_map, map_set), array, calibration)
+    run, geometry = as_calibrated_run(as_source(recording, array, column_map, map_set), array, calibration)
     examine(run, geometry, source=name_of(recording), force=force)
     measured = measure_impact(run, geometry, settings)
     if out is not None:

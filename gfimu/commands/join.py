@@ -12,15 +12,14 @@ if TYPE_CHECKING:
     from gfimu.geometry.array import AccelerometerArray
     from gfimu.importing import ColumnMap
     from gfimu.joining import Joined, ReferenceSeries
-    from gfimu.recording import Recording
-    from gfimu.recording.mapped import MappedFile
+    from gfimu.recording.mapped import RecordingLike
 
 __all__ = ["join"]
 
 
 @writes(reads=("channels", "reference", "array", "column_map", "reference_map"), out=RECORDING)
 def join(
-    channels: Recording | str | Path | MappedFile,
+    channels: RecordingLike,
     reference: ReferenceSeries | str | Path,
     *,
     out: str | Path | None = None,
@@ -36,7 +35,7 @@ def join(
 
     Parameters
     ----------
-    channels : Recording, str, Path or MappedFile
+    channels : Recording, path, table, or times (n,) with readings (n, c)
         The recording of the accelerometers, or its file.
     reference : ReferenceSeries, str or Path
         Tachometer, encoder angle, command or gyro with times of its own, or the file.
@@ -60,7 +59,7 @@ def join(
         If a file can't be read, the channels' checks refuse them, the reference does not change, or the two don't seem
         to belong together.
     """
-    from gfimu.commands.opened import as_array, by_map, name_of
+    from gfimu.commands.opened import as_array, as_source, name_of
     from gfimu.importing import load_map
     from gfimu.joining import ReferenceSeries, join_reference, open_reference
     from gfimu.recording import Recording
@@ -68,7 +67,7 @@ def join(
     from gfimu.recording.formats import open_recording
 
     drawing = None if array is None else as_array(array)
-    source = by_map(channels, column_map, map_set)
+    source = as_source(channels, array, column_map, map_set)
     recording = source if isinstance(source, Recording) else open_recording(source, array=drawing)
     examine(recording, drawing, source=name_of(channels), force=force)
     if drawing is not None:

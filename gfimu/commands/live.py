@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from gfimu.commands.former_arguments import former_arguments
 from gfimu.errors import InputError
 
 if TYPE_CHECKING:
@@ -20,6 +21,7 @@ _START_S = 3.0  # of a stream, which are examined
 _FEWEST, _MOST = 50, 5000  # samples of that start
 
 
+@former_arguments(bias_std="bias_std_m_s2")
 def live(
     array: AccelerometerArray | str | Path | None = None,
     rate: float | None = None,
@@ -27,7 +29,7 @@ def live(
     source: str | Path | Iterable[str] = "-",
     follow: bool = False,
     scale_std: float = 0.0,
-    bias_std: float | None = None,
+    bias_std_m_s2: float | None = None,
     unknown_start: bool = False,
     gyro: bool = False,
     axis: TurningAxis | str | Sequence[float] | None = None,
@@ -52,7 +54,7 @@ def live(
         With a recording: go on reading while `gfimu.record` writes it.
     scale_std : float
         Uncertainty of the scale factors, a ratio.
-    bias_std : float, optional
+    bias_std_m_s2 : float, optional
         Uncertainty of the biases, m/s²; the data sheets' by default.
     unknown_start : bool
         Whether the body may be spinning already.
@@ -110,10 +112,10 @@ def live(
     if about is not None:
         from gfimu.known_axis.live import axis_stream
 
-        if gyro or scale_std or bias_std is not None:
-            raise InputError("--gyro, --scale-std and --bias-std have no use with a known axis; leave them out")
+        if gyro or scale_std or bias_std_m_s2 is not None:
+            raise InputError("--gyro, --scale-std and --bias-std-m-s2 have no use with a known axis; leave them out")
         return axis_stream(lines, geometry, about, rate, at_rest=not unknown_start)
-    biases = {} if bias_std is None else {"bias_std": bias_std}
+    biases = {} if bias_std_m_s2 is None else {"bias_std": bias_std_m_s2}
     errors = SensorErrors.from_parts(geometry, rate, scale_std=scale_std, **biases)
     settings = FilterSettings(start_omega=None) if unknown_start else FilterSettings(start_omega=np.zeros(3))
     watched = None

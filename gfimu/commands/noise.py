@@ -17,8 +17,7 @@ if TYPE_CHECKING:
     from gfimu.geometry.array import AccelerometerArray
     from gfimu.geometry.turning_axis import TurningAxis
     from gfimu.importing import ColumnMap
-    from gfimu.recording import Recording
-    from gfimu.recording.mapped import MappedFile
+    from gfimu.recording.mapped import RecordingLike
     from gfimu.sensor_noise import RecordingNoise
 
 __all__ = ["noise"]
@@ -26,7 +25,7 @@ __all__ = ["noise"]
 
 @writes(reads=("recording", "calibration", "column_map", "array"), kalibr=KALIBR, picture=PICTURE)
 def noise(
-    recording: Recording | str | Path | MappedFile,
+    recording: RecordingLike,
     *,
     stretch: str = "rest",
     rest_threshold: float | None = None,
@@ -46,7 +45,7 @@ def noise(
 
     Parameters
     ----------
-    recording : Recording, str or Path
+    recording : Recording, path, table, or times (n,) with readings (n, c)
         The recording at rest, or its file.
     stretch : {"rest", "all"}
         Samples to use: the longest rest, or everything up to the first gap.
@@ -84,7 +83,7 @@ def noise(
     """
     from gfimu.calibration.run_file import open_calibrated, open_uncalibrated
     from gfimu.commands.known_axis import known_axis, turning_axis
-    from gfimu.commands.opened import as_array, as_calibration, by_map, name_of
+    from gfimu.commands.opened import as_array, as_calibration, as_source, name_of
     from gfimu.files.atomic_file import write_text
     from gfimu.recording import Recording
     from gfimu.recording.checks import examine
@@ -92,7 +91,7 @@ def noise(
 
     chosen = turning_axis(axis, axis_point, hub, None)
     unit = None if calibration is None else as_calibration(calibration)
-    source = by_map(recording, column_map, map_set)
+    source = as_source(recording, array, column_map, map_set)
     if isinstance(source, Recording):
         run = source if unit is None else unit.apply(source)
     else:

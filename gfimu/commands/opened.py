@@ -6,31 +6,41 @@ import os
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, TypeAlias, TypeGuard, cast
+
+import numpy as np
 
 from gfimu.errors import InputError
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
     from gfimu.calibration.result import Calibration
+    from gfimu.files.table import ArrowStream
     from gfimu.geometry.array import AccelerometerArray
     from gfimu.importing import ColumnMap
     from gfimu.recording import Recording
-    from gfimu.recording.mapped import MappedFile
+    from gfimu.recording.mapped import MappedFile, RecordingLike
     from gfimu.world_model import WorldModel
 
+Source: TypeAlias = "Recording | str | Path | MappedFile | ArrowStream"
+"""A recording, or what its readers take."""
+
 __all__ = [
+    "Source",
     "array_of",
     "as_array",
     "as_calibration",
     "as_run",
     "as_runs",
+    "as_source",
     "as_twin",
-    "by_map",
     "files_by_map",
+    "is_arrays",
     "name_of",
 ]
 
-_Source = TypeVar("_Source")
+_NUMBERS = (np.ndarray, list)
 
 
 def as_array(array: AccelerometerArray | str | Path) -> AccelerometerArray:
@@ -60,9 +70,7 @@ def array_of(recording: Recording) -> AccelerometerArray:
     return array
 
 
-def as_run(
-    recording: Recording | str | Path | MappedFile, array: AccelerometerArray | str | Path | None
-) -> tuple[Recording, AccelerometerArray]:
+def as_run(recording: Source, array: AccelerometerArray | str | Path | None) -> tuple[Recording, AccelerometerArray]:
     """Return a recording with its array; the recording's own array if none is given."""
     from gfimu.recording import Recording
     from gfimu.recording.formats import open_run
@@ -73,15 +81,21 @@ def as_run(
     return open_run(recording, drawing)
 
 
-def by_map(
-    recording: _Source, column_map: ColumnMap | str | Path | None, map_set: Sequence[str] = ()
-) -> _Source | MappedFile:
-    """Return a recording or its file as it is; a foreign file with its column map, where one is given.
+def as_source(
+    recording: RecordingLike,
+    array: AccelerometerArray | str | Path | None = None,
+    column_map: ColumnMap | str | Path | None = None,
+    map_set: Sequence[str] = (),
+) -> Source:
+    """Return what stands for a recording as the readers take it: the one way in for files, tables and arrays.
 
     Parameters
     ----------
-    recording : Recording, str, Path or MappedFile
-        The recording, or its file.
+    recording : Recording, str, Path, table, or tuple of arrays
+        A recording or a file is returned as it is, a foreign file with its column map where one is given. A table of
+        pandas, polars or pyarrow is opened like a file. Times (n,), s, and readings (n, c), m/s², become a recording.
+    array : AccelerometerArray, str or Path, optional
+        The array, which arrays of numbers need.
     column_map : ColumnMap, str or Path, optional
         The map, its name or file.
     map_set : sequence of str
@@ -90,10 +104,15 @@ def by_map(
     Raises
     ------
     InputError
-        If there is no such map, or a key is wrong.
+        If there is no such map, a key is wrong, or the arrays of numbers have no array or don't fit it.
     """
+    from gfimu.recording import Recording
     from gfimu.recording.mapped import MappedFile
 
+    if is_arrays(recording):
+        return _of_arrays(recording, array, mapped=column_map is not None or bool(map_set))
+    if not isinstance(recording, Recording | str | Path | MappedFile):
+        return _of_table(recording, array, column_map, map_set)
     if isinstance(recording, str | Path):
         if column_map is None and not map_set:
             return recording
@@ -105,6 +124,40 @@ def by_map(
 
         return replace(recording, column_map=load_map(recording.column_map, map_set))
     raise InputError("a map is for a file, and this recording has been read already; give its file")
+
+
+def is_arrays(recording: object) -> TypeGuard[tuple[ArrayLike, ArrayLike]]:
+    """Whether it is a pair of times and readings."""
+    return isinstance(recording, tuple) and len(recording) == 2 and all(isinstance(one, _NUMBERS) for one in recording)
+
+
+def _of_arrays(
+    recording: tuple[ArrayLike, ArrayLike], array: AccelerometerArray | str | Path | None, *, mapped: bool
+) -> Recording:
+    from gfimu.recording import Recording
+
+    if mapped:
+        raise InputError("a map is for a file or a table; arrays of numbers have no columns to map")
+    if array is None:
+        raise InputError("NumPy arrays: times and readings do not name their array; give it as array=")
+    return Recording.from_arrays(*recording, as_array(array))
+
+
+def _of_table(
+    table: object,
+    array: AccelerometerArray | str | Path | None,
+    column_map: ColumnMap | str | Path | None,
+    map_set: Sequence[str],
+) -> Source:
+    from gfimu.files.table_columns import TableColumns
+
+    if column_map is None and not map_set:
+        return cast("Source", table if isinstance(table, TableColumns) else TableColumns(table))
+    from gfimu.importing import load_map
+    from gfimu.recording.mapped import mapped_recording
+
+    chosen = load_map(column_map, map_set)
+    return mapped_recording(cast("ArrowStream", table), chosen, array=None if array is None else as_array(array))
 
 
 def files_by_map(
@@ -142,7 +195,7 @@ def as_calibration(calibration: Calibration | str | Path) -> Calibration:
 
 
 def as_calibrated_run(
-    recording: Recording | str | Path | MappedFile,
+    recording: Source,
     array: AccelerometerArray | str | Path | None,
     calibration: Calibration | str | Path | None,
 ) -> tuple[Recording, AccelerometerArray]:
@@ -175,11 +228,10 @@ def as_twin(twin: WorldModel | str | Path) -> WorldModel:
     return load_model(twin) or Twin.load(twin)
 
 
-def as_runs(
-    recordings: Recording | str | Path | MappedFile | Sequence[Recording | str | Path | MappedFile],
-) -> list[Recording | str | Path | MappedFile]:
+def as_runs(recordings: RecordingLike | Sequence[RecordingLike]) -> list[RecordingLike]:
     """Return recordings given as one of them, or as a list or tuple of several."""
-    return list(recordings) if isinstance(recordings, list | tuple) else [recordings]  # type: ignore[list-item]
+    several = isinstance(recordings, list | tuple) and not is_arrays(recordings)
+    return list(recordings) if several else [recordings]  # type: ignore[arg-type, list-item]
 
 
 def name_of(recording: object) -> str:

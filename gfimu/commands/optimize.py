@@ -28,7 +28,7 @@ _MORE_CHIPS = 4  # of a front over chips, beyond the least number, unless the la
     reads=("brief",),
     out=ARRAY_FILE,
     picture=PICTURE,
-    front=OutputFolder(("front.json", "front.png")),
+    front=OutputFolder(("front.json", "front.png"), needs=("matplotlib",)),
 )
 def optimize(
     chips: int | None = None,

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from gfimu.errors import InputError, RecordingWarning
 from gfimu.files.outputs import RECORDING, RERUN, writes
+from gfimu.optional_packages import require
 
 if TYPE_CHECKING:
     from firmware_bridge.frames.decoder import StreamCounts
@@ -208,7 +209,7 @@ def _found(
         speeds = ", ".join(str(speed) for speed in sorted(SPEEDS))
         raise InputError(
             f"{port or 'serial ports'}: no board answers or sends {form or 'a known format'} at {speeds} baud; "
-            "check power, cable and --format (docs/bench.md)"
+            "check power, cable and --format (docs/how_to/bench.md)"
         )
     for board in boards:
         if on_find is not None:
@@ -232,6 +233,7 @@ class _LateView:
         self._view: LiveView | None = None
         self._opened = False
         if live:
+            require("--live", "rerun")
             from gfimu.files.rerun_stream import check_display
 
             check_display()

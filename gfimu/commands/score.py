@@ -6,7 +6,13 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gfimu.commands.former_arguments import former_arguments
+from gfimu.results import Panel, PlottedResult, Series, result_html
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -17,12 +23,103 @@ if TYPE_CHECKING:
     from gfimu.known_axis.accuracy.bounds import AxisBounds
     from gfimu.known_axis.accuracy.predicted import PredictedRun
 
-__all__ = ["score"]
+__all__ = ["Scores", "score"]
+
+_COLUMNS = (
+    "array",
+    "channels",
+    "length_unit_m",
+    "condition_number",
+    "gdop",
+    "gdop_joint",
+    "null_space_rank",
+    "rate_bound_z_rad_s",
+    "sigma_rate_filter_rad_s",
+)
+"""Columns of the notebook's table."""
 
 _FASTEST = 1e6  # rad/s
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
+class Scores(list["Score | AxisBounds"], PlottedResult):
+    """Scores of arrays side by side, in the order in which the arrays were given.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> scores = gfimu.score(["cube12", "corners8"])
+    >>> [f"{one.name} {one.gdop:.3f}" for one in scores.rigid]
+    ['cube12 1.061', 'corners8 0.750']
+    >>> scores.best.name
+    'corners8'
+    """
+
+    @property
+    def rigid(self) -> tuple[Score, ...]:
+        """Scores of the arrays that see all six motions."""
+        from gfimu.geometry.scoring import Score
+
+        return tuple(one for one in self if isinstance(one, Score))
+
+    @property
+    def about_axis(self) -> tuple[AxisBounds, ...]:
+        """Bounds of the arrays that were scored about an axis."""
+        from gfimu.known_axis.accuracy.bounds import AxisBounds
+
+        return tuple(one for one in self if isinstance(one, AxisBounds))
+
+    @property
+    def best(self) -> Score:
+        """The score of least GDOP among the arrays that see all six motions.
+
+        Raises
+        ------
+        InputError
+            If none does.
+        """
+        from gfimu.errors import InputError
+
+        if not self.rigid:
+            raise InputError("no array here sees all six motions, so none has a GDOP; see about_axis")
+        return min(self.rigid, key=lambda one: one.gdop)
+
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """Return one row per array, with the columns of its own table; NaN where an array has no such figure."""
+        rows = [one.to_columns() for one in self]
+        names = list(dict.fromkeys(name for row in rows for name in row))
+        return {name: np.concatenate([row.get(name, np.array([np.nan])) for row in rows]) for name in names}
+
+    def _heading(self) -> str:
+        return "Scores"
+
+    def _repr_html_(self) -> str:
+        columns = self.to_columns()
+        shown = _COLUMNS if self.rigid else tuple(columns)
+        return result_html(
+            self._heading(), [], {name: columns[name] for name in shown if name in columns}, self._notes()
+        )
+
+    def _notes(self) -> tuple[str, ...]:
+        from gfimu.geometry.scoring import ranking_remark
+
+        remark = ranking_remark(self.rigid)
+        return (remark,) if remark else ()
+
+    def _panels(self) -> list[Panel]:
+        from gfimu.geometry.scoring import score_panels
+
+        if self.rigid:
+            return score_panels(self.rigid)
+        names = tuple(one.array for one in self.about_axis)
+        kinds = (("one sample", "sample_std"), ("filter, settled", "filter_std"))
+        series = tuple(
+            Series(label, np.array([getattr(one, key) for one in self.about_axis], dtype=float)) for label, key in kinds
+        )
+        return [Panel("bounds on the rate about the axis", "σ of the rate, rad/s", series, names, scale="zero")]
+
+
+@former_arguments(duration_s="duration", sample_rate_hz="rate")
 def score(
     arrays: AccelerometerArray | str | Path | Sequence[AccelerometerArray | str | Path] | None = None,
     *,
@@ -34,19 +131,19 @@ def score(
     axis: TurningAxis | str | Sequence[float] | None = None,
     axis_point: Sequence[float] = (0.0, 0.0, 0.0),
     hub: str = "fixed",
-    sample_rate_hz: float = 100.0,
+    rate: float = 100.0,
     inclination_rad: float | None = None,
     point_std_m: float = 0.0,
     direction_std_rad: float = 0.0,
     lever_std_m: float = 0.0,
     rotation_std_rad: float = 0.0,
     bias_std_m_s2: float = 0.0,
-    duration_s: float = 60.0,
+    duration: float = 60.0,
     hub_std_m_s2: float = 0.7,
     jerk_rad2_s5: float = 1.0,
     fault_time_s: float = 1.0,
     per_channel: bool = False,
-) -> list[Score | AxisBounds]:
+) -> Scores:
     """Score the geometry of one or several arrays.
 
     An array that can't see all six motions is scored about its own axis, if its file names one.
@@ -73,14 +170,14 @@ def score(
         A point of that axis, body frame, m.
     hub : {"fixed", "free"}
         Whether that axis stands still (a table) or moves with a body (a wheel).
-    sample_rate_hz : float
+    rate : float
         Sample rate at which the least faults, and the bound of a filter about that axis, hold.
     inclination_rad : float, optional
         Angle between that axis and the vertical, rad; by default a fixed one is upright, a free one level.
     point_std_m, direction_std_rad, lever_std_m, rotation_std_rad, bias_std_m_s2 : float
         How exactly axis, places, orientations and biases of the chips are known
         (`gfimu.geometry.turning_axis.AxisUncertainty`); where all are 0, those of the array file hold.
-    duration_s, hub_std_m_s2, jerk_rad2_s5 : float
+    duration, hub_std_m_s2, jerk_rad2_s5 : float
         The run for which the estimate's standard deviation is predicted
         (`gfimu.known_axis.accuracy.predicted.PredictedRun`).
     fault_time_s : float
@@ -121,15 +218,15 @@ def score(
     scores: Iterator[Score] = iter(())
     if seeing:
         scores = iter(score_arrays(seeing, length_unit_m=length_unit_m, omega_rad_s=omega, noise_m_s2=noise_m_s2))
-    found: list[Score | AxisBounds] = []
+    found = Scores()
     if len(seeing) < len(given_axes):  # the others don't wait for a compiler
         from gfimu.known_axis.accuracy.predicted import PredictedRun
 
-        run = PredictedRun(duration_s, sample_rate_hz, hub_std_m_s2, jerk_rad2_s5)
+        run = PredictedRun(duration, rate, hub_std_m_s2, jerk_rad2_s5)
     for array, about in given_axes:
         if about is None:
             faults = fault_protection(
-                array, noise_m_s2=noise_m_s2, sample_rate_hz=sample_rate_hz, duration_s=fault_time_s,
+                array, noise_m_s2=noise_m_s2, sample_rate_hz=rate, duration_s=fault_time_s,
                 per_channel=per_channel,
             )  # fmt: skip
             found.append(replace(next(scores), protection=faults))

@@ -9,8 +9,13 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from gfimu.commands.former_arguments import former_arguments
 from gfimu.errors import InputError
 from gfimu.files.outputs import PICTURE, writes
+from gfimu.results import Panel, PlottedResult, Series, text_column
 
 if TYPE_CHECKING:
     from gfimu.commands.tolerance_units import UnitErrors
@@ -30,7 +35,7 @@ _MOST_SAMPLES = 6000  # numerical: memory of the first-order maps, 1 GB with 24 
 
 
 @dataclass(frozen=True)
-class ToleranceResult:
+class ToleranceResult(PlottedResult):
     """Errors of an array by its tolerances, before and after calibration.
 
     Parameters
@@ -72,6 +77,46 @@ class ToleranceResult:
             for calibration, found in self.units.items()
         }
 
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """Return one row per calibration, quantity and cause: the rms error it makes, its share of the variance."""
+        rows = [
+            (calibration, one, cause, size)
+            for calibration, budget in self.budgets.items()
+            for one in budget.quantities.values()
+            for cause, size in one.by_cause.items()
+        ]
+        return {
+            "calibration": text_column(calibration for calibration, _, _, _ in rows),
+            "quantity": text_column(one.name for _, one, _, _ in rows),
+            "cause": text_column(cause for _, _, cause, _ in rows),
+            "rms": np.array([size for _, _, _, size in rows], dtype=float),
+            "unit": text_column(one.unit for _, one, _, _ in rows),
+            "share": np.array([one.shares[cause] for _, one, cause, _ in rows], dtype=float),
+        }
+
+    def _heading(self) -> str:
+        return f"Tolerances of {self.array}"
+
+    def _facts(self) -> list[tuple[str, str]]:
+        facts = [("motion", self.motion)]
+        for calibration, budget in self.budgets.items():
+            sizes = "; ".join(f"{one.name} {one.rms:.3g} {one.unit}" for one in budget.quantities.values())
+            facts.append((f"errors, {calibration.replace('_', ' ')}", sizes))
+        return facts
+
+    def _panels(self) -> list[Panel]:
+        first = next(iter(self.budgets.values()))
+        panels = []
+        for name, quantity in first.quantities.items():
+            causes = tuple(dict.fromkeys(c for one in self.budgets.values() for c in one.quantities[name].by_cause))
+            series = tuple(
+                Series(key.replace("_", " "), np.array([one.quantities[name].by_cause.get(c, np.nan) for c in causes]))
+                for key, one in self.budgets.items()
+            )
+            title = f"error of {name.replace('_', ' ')}, by cause"
+            panels.append(Panel(title, f"rms, {quantity.unit}", series, causes, scale="log"))
+        return panels
+
     def to_dict(self) -> dict[str, Any]:
         """Return the content of ``gfimu tolerance --json``."""
         from gfimu.tolerances.words import tolerance_figures
@@ -99,14 +144,15 @@ class ToleranceResult:
         }
 
 
-@writes(reads=("array", "scenario"), out=PICTURE)
+@former_arguments(time="duration", rate="speed_rad_s", placement_mm="position_mm", out="picture")
+@writes(reads=("array", "scenario"), picture=PICTURE)
 def tolerance(
     array: AccelerometerArray | str | Path,
     *,
     scenario: Scenario | str | Path | None = None,
-    time: float | None = None,
-    rate: float = 5.0,
-    placement_mm: float = 0.2,
+    duration: float | None = None,
+    speed_rad_s: float = 5.0,
+    position_mm: float = 0.2,
     angle_deg: float = 0.5,
     normal: bool = False,
     part: str | None = None,
@@ -121,7 +167,7 @@ def tolerance(
     units: int = 200,
     seed: int = 0,
     workers: int | None = None,
-    out: str | Path | None = None,
+    picture: str | Path | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> ToleranceResult:
     """Budget what machining and chip tolerances do to α, ω and position, and simulate units beside it.
@@ -133,11 +179,11 @@ def tolerance(
     scenario : Scenario, str or Path, optional
         Motion: a scenario, its name or file; its array, sensors and effects are not used. By default the array rests
         level for 1.5 s, is spun up about the vertical within 0.5 s, and turns on.
-    time : float, optional
+    duration : float, optional
         Length of the run, s; 3 s by default, or that of the scenario.
-    rate : float
-        Rate of the default motion, rad/s.
-    placement_mm : float
+    speed_rad_s : float
+        Angular rate of the default motion, rad/s.
+    position_mm : float
         Limit of the position error of each chip along each axis, mm.
     angle_deg : float
         Limit of the rotation of each chip about each axis, °.
@@ -161,7 +207,7 @@ def tolerance(
         Their seed.
     workers : int, optional
         Worker processes; by default as many as this process has processors. The result does not depend on it.
-    out : str or Path, optional
+    picture : str or Path, optional
         Picture to write, ``.png``, ``.svg`` or ``.pdf``.
     progress : callable, optional
         Called with the number of simulated units done.
@@ -178,14 +224,13 @@ def tolerance(
     from gfimu.geometry.observability import require_all_motions
     from gfimu.tolerances.budget import tolerance_budget
     from gfimu.tolerances.calibrated import calibrations_of, check_calibration
-    from gfimu.tolerances.picture import tolerance_picture
     from gfimu.tolerances.propagation import error_maps
     from gfimu.tolerances.tolerances import ChipErrors, Tolerances
     from gfimu.units import MILLI_G
     from sim.sweep.executors import processors
     from sim.toleranced import known_motion_of
 
-    _check("--placement-mm", placement_mm)
+    _check("--position-mm", position_mm)
     _check("--angle-deg", angle_deg)
     _check("--temperature-k", temperature_k)
     if not closed_form and not _LEAST_UNITS <= units <= _MOST_UNITS:
@@ -204,7 +249,7 @@ def tolerance(
         drawn, name = drawn.with_part_file(part)
         drawn = drawn.with_part(name)
     require_all_motions(drawn, or_axis=False)
-    run, words = _run(drawn, scenario, time, rate)
+    run, words = _run(drawn, scenario, duration, speed_rad_s)
     motion = known_motion_of(run)
     for name in calibrated:
         check_calibration(name, drawn, motion)
@@ -212,7 +257,7 @@ def tolerance(
     tolerances = Tolerances.of(
         drawn,
         run.sample_rate,
-        placement_m=1e-3 * placement_mm,
+        placement_m=1e-3 * position_mm,
         angle_rad=math.radians(angle_deg),
         shape="normal" if normal else "uniform",
         chip=chip,
@@ -228,9 +273,11 @@ def tolerance(
         task = UnitTask(run, posed, tolerances, names, maps.rate is not None, seed)
         simulated = simulate_units(task, units, workers or processors(), progress=progress)
     result = ToleranceResult(drawn.name, words, motion.levelled > 0, tolerances, budgets, simulated, seed)
-    if out is not None:
+    if picture is not None:
         errors = {name: found.errors for name, found in simulated.items()}
-        tolerance_picture(out, budgets, errors, tolerances.shape, title=f"{drawn.name}: {words}")
+        from gfimu.tolerances.picture import tolerance_picture
+
+        tolerance_picture(picture, budgets, errors, tolerances.shape, title=f"{drawn.name}: {words}")
     return result
 
 
@@ -246,32 +293,34 @@ def _scaled(option: str, value: float | None, unit: float) -> float | None:
 
 
 def _run(
-    array: AccelerometerArray, scenario: Scenario | str | Path | None, time: float | None, rate: float
+    array: AccelerometerArray, scenario: Scenario | str | Path | None, duration: float | None, speed_rad_s: float
 ) -> tuple[Scenario, str]:
     """Return the run with the array as drawn and nothing wrong in it, and what it is in words."""
     from sim.scenarios import Scenario
     from sim.toleranced import LEAST_TIME_S, REST_S, reference_motion
 
     if scenario is None:
-        length = _USUAL_TIME_S if time is None else time
+        length = _USUAL_TIME_S if duration is None else duration
         if not LEAST_TIME_S < length < math.inf:
-            raise InputError(f"--time {length:g}: the default motion is longer than {LEAST_TIME_S:g} s; give more")
-        if not 0.0 < abs(rate) <= 1e3:
-            raise InputError(f"--rate {rate:g}: give a rate of at most 1000 rad/s that is not zero")
-        run = reference_motion(array, time=length, rate=rate)
-        words = f"at rest for {REST_S:g} s, then spun up to {rate:g} rad/s about the vertical, {length:g} s in all"
+            raise InputError(f"--duration {length:g}: the default motion is longer than {LEAST_TIME_S:g} s; give more")
+        if not 0.0 < abs(speed_rad_s) <= 1e3:
+            raise InputError(f"--speed-rad-s {speed_rad_s:g}: give a rate of at most 1000 rad/s that is not zero")
+        run = reference_motion(array, time=length, rate=speed_rad_s)
+        words = (
+            f"at rest for {REST_S:g} s, then spun up to {speed_rad_s:g} rad/s about the vertical, {length:g} s in all"
+        )
     else:
         given = scenario if isinstance(scenario, Scenario) else Scenario.load(scenario)
-        length = given.duration if time is None else time
+        length = given.duration if duration is None else duration
         if not 0.0 < length <= given.duration:
             raise InputError(
-                f"--time {length:g}: scenario {given.name!r} lasts {given.duration:g} s; give at most that"
+                f"--duration {length:g}: scenario {given.name!r} lasts {given.duration:g} s; give at most that"
             )
         run = replace(given, array=array, part=None, duration=length, driven=False, effects=(), earth=None)
         words = f"scenario {given.name}, {length:g} s"
     if not 10 <= round(run.duration * run.sample_rate) <= _MOST_SAMPLES:
         raise InputError(
-            f"the run has {run.duration * run.sample_rate:.0f} samples; give a --time with 10 to {_MOST_SAMPLES}"
+            f"the run has {run.duration * run.sample_rate:.0f} samples; give a --duration with 10 to {_MOST_SAMPLES}"
         )
     return run, words
 

@@ -7,18 +7,22 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gfimu.files.outputs import RERUN, check_outputs, writes
+from gfimu.optional_packages import require
 
 if TYPE_CHECKING:
+    from gfimu.diagnosis.verdict.verdict import Diagnosis
     from gfimu.geometry.array import AccelerometerArray
     from gfimu.geometry.turning_axis import TurningAxis
     from gfimu.importing import ColumnMap
+    from gfimu.motion.estimation import Estimate
+    from gfimu.recording.mapped import RecordingLike
 
 __all__ = ["view"]
 
 
 @writes(reads=("file", "array", "column_map"), out=RERUN)
 def view(
-    file: str | Path,
+    file: RecordingLike | Estimate | Diagnosis,
     *,
     array: AccelerometerArray | str | Path | None = None,
     column_map: ColumnMap | str | Path | None = None,
@@ -35,8 +39,9 @@ def view(
 
     Parameters
     ----------
-    file : str or Path
-        A ``.rrd`` file, or a recording or an estimate to make one from; that goes beside it as ``FILE.view.rrd``.
+    file : path, Recording, Estimate, Diagnosis, table, or times (n,) with readings (n, c)
+        A ``.rrd`` file, or a recording, an estimate or a diagnosis to make one from. That goes beside a file as
+        ``FILE.view.rrd``, else into a temporary folder.
     array : AccelerometerArray, str or Path, optional
         The array, its name or file; the recording's own by default.
     column_map : ColumnMap, str or Path, optional
@@ -71,26 +76,40 @@ def view(
     GfimuError
         If this machine has no display, or the viewer fails; the message says what to do instead.
     """
+    require("gfimu view", "rerun")
     from gfimu.commands.known_axis import turning_axis
-    from gfimu.commands.opened import as_array, by_map
+    from gfimu.commands.opened import as_array, as_source
+    from gfimu.diagnosis.verdict.verdict import Diagnosis
+    from gfimu.motion.estimation import Estimate
     from gfimu.visual.picture import picture_of, picture_path
     from gfimu.visual.viewer import open_viewer
 
-    source = Path(file)
-    if source.suffix == ".rrd" and out is None:
+    source = Path(file) if isinstance(file, str | Path) else None
+    if source is not None and source.suffix == ".rrd" and out is None:
         open_viewer(source)
         return source
     picture = picture_path(source) if out is None else Path(out)
-    check_outputs([("out", picture, RERUN)], [source])
-    picture_of(
-        by_map(source, column_map, map_set),
-        picture,
-        array=None if array is None else as_array(array),
-        axis=turning_axis(axis, axis_point, hub, inclination_rad),
-        force=force,
-    )
+    check_outputs([("out", picture, RERUN)], [] if source is None else [source])
+    if isinstance(file, Diagnosis):
+        _picture_of_diagnosis(picture, file)
+    else:
+        drawing = None if array is None else as_array(array)
+        picture_of(
+            file if isinstance(file, Estimate) else as_source(source or file, drawing, column_map, map_set),
+            picture,
+            array=drawing,
+            axis=turning_axis(axis, axis_point, hub, inclination_rad),
+            force=force,
+        )
     if on_picture is not None:
         on_picture(picture)
     if out is None:
         open_viewer(picture)
     return picture
+
+
+def _picture_of_diagnosis(path: Path, diagnosis: Diagnosis) -> None:
+    from gfimu.commands.diagnose import drawn_rig
+    from gfimu.diagnosis.report.picture import write_picture
+
+    write_picture(path, diagnosis, rig=drawn_rig(diagnosis))

@@ -18,6 +18,7 @@ from gfimu.geometry.kinematics import pseudo_inverse
 from gfimu.motion.estimation import Estimate
 from gfimu.parts.limits import PartLimits
 from gfimu.recording import Recording
+from gfimu.results import Panel, PlottedResult
 from gfimu.units import STANDARD_GRAVITY
 
 __all__ = ["Impact", "ImpactSettings", "measure_impact", "time_zero"]
@@ -61,7 +62,7 @@ class ImpactSettings:
 
 
 @dataclass(frozen=True)
-class Impact:
+class Impact(PlottedResult):
     """One impact.
 
     Parameters
@@ -104,6 +105,28 @@ class Impact:
     warnings: tuple[str, ...]
     motion: Estimate
     recording: Recording
+
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """Return the motion from shortly before time zero on, the columns of an Estimate file."""
+        return self.motion.to_columns()
+
+    def _facts(self) -> list[tuple[str, str]]:
+        change = ", ".join(f"{one:.3g}" for one in self.velocity_change_m_s)
+        return [
+            ("time zero", f"{self.time_zero_s:.4f} s"),
+            ("duration", f"{1e3 * self.duration_s:.3g} ms"),
+            ("peak specific force", f"{self.peak_p_m_s2:.4g} m/s² at {1e3 * self.peak_p_time_s:.3g} ms"),
+            ("velocity change", f"({change}) m/s"),
+            ("peak α", f"{self.peak_alpha_rad_s2:.4g} ± {self.peak_alpha_std_rad_s2:.2g} rad/s²"),
+            ("peak ω", f"{self.peak_omega_rad_s:.4g} rad/s"),
+            ("HIC15", f"{self.hic15:.3g}"),
+        ]
+
+    def _notes(self) -> tuple[str, ...]:
+        return self.warnings
+
+    def _panels(self) -> list[Panel]:
+        return self.motion._panels()[:3]
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of ``gfimu impact --json``."""

@@ -4,17 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import matplotlib as mpl
 import numpy as np
+from matplotlib.figure import Figure
 
 from gfimu.crash.event import Impact
 from gfimu.files.atomic_file import atomic_path
 from gfimu.units import STANDARD_GRAVITY
 from gfimu.visual.colours import AXES, css
-
-mpl.use("Agg")
-
-from matplotlib.figure import Figure
 
 __all__ = ["impact_picture"]
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from gfimu.errors import GfimuError
 from gfimu.exporting.chips import ChipStream, chips_of, stamps_ns
 from gfimu.files.atomic_file import atomic_path
+from gfimu.optional_packages import require
 from gfimu.recording import Recording
 
 __all__ = ["write_mcap"]
@@ -29,13 +29,10 @@ def write_mcap(file: str | Path, recording: Recording) -> None:
     InputError
         If a chip has not three axes at right angles, or the file can't be written.
     """
-    try:
-        from mcap.writer import Writer
-        from rosbags.typesys import Stores, get_typestore
-    except ImportError:
-        raise GfimuError(
-            f"{file}: MCAP needs mcap and rosbags, which are not installed: pip install 'gfimu[formats]'"
-        ) from None
+    require(f"{file}: MCAP", "mcap", "rosbags")
+    from mcap.writer import Writer
+    from rosbags.typesys import Stores, get_typestore
+
     store = get_typestore(Stores.ROS2_HUMBLE)
     streams, stamps = list(chips_of(recording)), stamps_ns(recording)
     definition, _ = store.generate_msgdef(_IMU, ros_version=2)

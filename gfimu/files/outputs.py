@@ -11,11 +11,12 @@ import functools
 import inspect
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
 from gfimu.errors import InputError
+from gfimu.optional_packages import require
 
 __all__ = [
     "ARRAY_FILE",
@@ -61,10 +62,13 @@ class OutputFile:
         What the file is, for messages.
     suffixes : tuple of str
         File name extensions that its writer supports.
+    needs : mapping of str to tuple of str
+        Optional packages (`gfimu.optional_packages`) that writing takes, by extension; none for an extension not here.
     """
 
     what: str
     suffixes: tuple[str, ...]
+    needs: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     def check_suffix(self, path: Path) -> None:
         """Raise `InputError` for an extension that the writer does not support."""
@@ -75,6 +79,10 @@ class OutputFile:
         raise InputError(
             f"{path}: unknown file format {path.suffix!r} for {self.what}; use {' or '.join(self.suffixes)}"
         )
+
+    def check_packages(self, path: Path) -> None:
+        """Raise `MissingPackageError` where a package is not installed that writes files of this extension."""
+        require(f"{path}: {self.what}", *self.needs.get(path.suffix, ()))
 
     def files(self, path: Path) -> list[Path]:
         """Return the files that will be replaced."""
@@ -89,12 +97,19 @@ class OutputFolder:
     ----------
     names : tuple of str
         Files that it will hold, relative to it; another file of the same name is replaced.
+    needs : tuple of str
+        Optional packages (`gfimu.optional_packages`) that writing them takes.
     """
 
     names: tuple[str, ...]
+    needs: tuple[str, ...] = ()
 
     def check_suffix(self, path: Path) -> None:
         """Accept any name: folders have no extension."""
+
+    def check_packages(self, path: Path) -> None:
+        """Raise `MissingPackageError` where a package is not installed that writes one of the files."""
+        require(f"{path}: what is written there", *self.needs)
 
     def files(self, path: Path) -> list[Path]:
         """Return the files that will be replaced."""
@@ -104,10 +119,14 @@ class OutputFolder:
 Output = OutputFile | OutputFolder
 
 RECORDING = OutputFile("a recording", (".csv", ".parquet"))
-EXPORT = OutputFile("what is converted", (".csv", ".parquet", ".mcap", ".euroc", ".yaml", ".yml", ".xml"))
+EXPORT = OutputFile(
+    "what is converted",
+    (".csv", ".parquet", ".mcap", ".euroc", ".yaml", ".yml", ".xml"),
+    {".mcap": ("mcap", "rosbags"), ".xml": ("mujoco",)},
+)
 ESTIMATE = OutputFile("an estimate", (".csv", ".parquet"))
-RERUN = OutputFile("a rerun recording", (".rrd",))
-TRACE = OutputFile("a trace", (".vcd", ".rrd"))
+RERUN = OutputFile("a rerun recording", (".rrd",), {".rrd": ("rerun",)})
+TRACE = OutputFile("a trace", (".vcd", ".rrd"), {".rrd": ("rerun",)})
 CALIBRATION = OutputFile("a calibration", (".json",))
 COLUMN_MAP = OutputFile("a column map", (".toml",))
 ARRAY_FILE = OutputFile("an array file", (".toml",))
@@ -115,7 +134,7 @@ SCENARIO = OutputFile("a scenario file", (".toml",))
 TOML_FILE = OutputFile("a TOML file", (".toml",))
 KALIBR = OutputFile("a Kalibr file", (".yaml", ".yml"))
 JSON_SCHEMA = OutputFile("a JSON schema", (".json",))
-PICTURE = OutputFile("a picture", (".png", ".svg", ".pdf"))
+PICTURE = OutputFile("a picture", (".png", ".svg", ".pdf"), dict.fromkeys((".png", ".svg", ".pdf"), ("matplotlib",)))
 
 
 def check_parent(path: Path) -> None:
@@ -156,6 +175,7 @@ def _check(outputs: Iterable[tuple[str, str | Path, Output]], read: list[Path]) 
     for name, value, output in outputs:
         path = Path(value)
         output.check_suffix(path)
+        output.check_packages(path)
         check_parent(path)
         _check_kind(path, output)
         for file in output.files(path):

@@ -8,7 +8,6 @@ the templates come from the same struct, so a new key is one annotated line.
 
 from __future__ import annotations
 
-import difflib
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -18,7 +17,7 @@ from typing import Annotated, Any, TypeVar
 import msgspec
 from msgspec import inspect as types
 
-from gfimu.errors import InputError
+from gfimu.errors import InputError, nearest_name
 
 __all__ = ["NotNegative", "Positive", "Table", "Triple", "about", "read", "tagged", "without_none"]
 
@@ -29,6 +28,7 @@ Positive = Annotated[float, msgspec.Meta(gt=0)]
 NotNegative = Annotated[float, msgspec.Meta(ge=0)]
 
 _ALIKE = 0.9  # numerical: of difflib; a key of a part file so like a known one is a slip, not a note of its author
+_ROUGHLY = 0.6  # numerical: of difflib; a word of a list that is wrong in any case
 _LONGEST_VALUE = 60  # characters of a value in a message
 
 
@@ -100,7 +100,7 @@ def read(data: Any, kind: type[_Table], source: str) -> _Table:
     for path in _not_finite(data):
         raise _explained(f"not finite - at `${path}`", data, kind, source)
     for key in data.keys() - set(kind.__struct_fields__):  # of a table that takes notes of its author
-        for near in difflib.get_close_matches(key, kind.__struct_fields__, 1, _ALIKE):
+        if near := nearest_name(key, kind.__struct_fields__, _ALIKE):
             raise InputError(f"{source}: unknown key {key!r}; did you mean {near!r}?")
     return found
 
@@ -241,8 +241,8 @@ def _unknown(key: str, valid: Sequence[str]) -> str:
 
 def _nearest(word: Any, valid: Sequence[Any]) -> str:
     """Return the remedy for a slip of the pen; empty where no valid word is near."""
-    near = difflib.get_close_matches(str(word), [str(one) for one in valid], 1)
-    return f"; did you mean {near[0]!r}?" if near else ""
+    near = nearest_name(str(word), [str(one) for one in valid], _ROUGHLY)
+    return f"; did you mean {near!r}?" if near else ""
 
 
 def _missing(key: str, info: types.Type) -> str:

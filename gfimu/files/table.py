@@ -6,22 +6,15 @@ The metadata go with the columns: as ``attrs`` of a pandas table, and as JSON in
 from __future__ import annotations
 
 import json
-from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from gfimu.errors import GfimuError
-
-if TYPE_CHECKING:
-    import pandas as pd
-
 __all__ = [
     "ArrowStream",
-    "Tabular",
     "arrow_column",
     "as_found",
     "column_type",
@@ -43,41 +36,6 @@ class ArrowStream(Protocol):
     def __arrow_c_stream__(self, requested_schema: Any = None) -> Any:
         """Return the columns as a stream."""
         ...
-
-
-class Tabular(ABC):
-    """A result with one row per sample, for other libraries."""
-
-    @abstractmethod
-    def to_columns(self) -> Mapping[str, NDArray[Any]]:
-        """Return the columns by name with unit."""
-
-    def _table_metadata(self) -> Mapping[str, Any]:
-        return getattr(self, "metadata", {})
-
-    def to_pandas(self) -> pd.DataFrame:
-        """Return the columns as a pandas table, with the metadata in ``attrs``.
-
-        Raises
-        ------
-        GfimuError
-            If pandas is not installed.
-        """
-        try:
-            import pandas as pd
-        except ImportError:
-            raise GfimuError("to_pandas needs pandas, which is not installed: pip install 'gfimu[tables]'") from None
-        table = pd.DataFrame(dict(self.to_columns()))
-        table.attrs = json.loads(to_json(dict(self._table_metadata())))
-        return table
-
-    def __arrow_c_stream__(self, requested_schema: Any = None) -> Any:
-        """Return the columns as an Arrow stream: ``polars.DataFrame(result)``, ``pyarrow.table(result)``."""
-        columns = self.to_columns()
-        fields = [(name, column_type(values)) for name, values in columns.items()]
-        schema = pa.schema(fields, metadata=schema_metadata(self._table_metadata()))
-        table = pa.table([pa.array(values) for values in columns.values()], schema=schema)
-        return table.__arrow_c_stream__(requested_schema)
 
 
 def column_type(values: NDArray[Any]) -> pa.DataType:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from numbers import Number
 from typing import Any
 
@@ -11,7 +11,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from gfimu.errors import InputError
-from gfimu.files.table import ArrowStream, metadata_of_schema, numbers
+from gfimu.files.table import ArrowStream, arrow_column, metadata_of_schema, numbers
 
 __all__ = ["TableColumns"]
 
@@ -46,6 +46,13 @@ class TableColumns:
                 "or pyarrow"
             )
 
+    @classmethod
+    def of(cls, columns: Mapping[str, NDArray[Any]], metadata: Mapping[str, Any], name: str) -> TableColumns:
+        """Open columns in memory under a name for messages."""
+        table = cls(pa.table({key: arrow_column(values) for key, values in columns.items()}))
+        table.file, table.metadata = name, dict(metadata)
+        return table
+
     def _open_pandas(self, table: Any) -> None:
         if table.index.name == "t_s" and "t_s" not in table.columns:
             table = table.reset_index()
@@ -65,6 +72,23 @@ class TableColumns:
         self.metadata = metadata_of_schema(table.schema.metadata)
         self._column = table.column
         self._found = lambda name: _as_found(table.column(name))
+
+    def rename(self, names: Mapping[str, str]) -> None:
+        """Give columns other names, by their present ones.
+
+        Raises
+        ------
+        InputError
+            If there is no such column, or two would have one name.
+        """
+        missing = [name for name in names if name not in self.names]
+        if missing:
+            raise InputError(f"{self.file}: column {missing[0]!r} is missing; it has {', '.join(self.names[:20])}")
+        former = {names.get(name, name): name for name in self.names}
+        column, found = self._column, self._found
+        self.names = self._checked([names.get(name, name) for name in self.names])
+        self._column = lambda name: column(former[name])
+        self._found = lambda name: found(former[name])
 
     def _checked(self, names: list[Any]) -> list[str]:
         for name in names:

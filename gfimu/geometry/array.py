@@ -152,7 +152,7 @@ class AccelerometerArray:
 
     @cached_property
     def regression_matrix(self) -> NDArray[np.float64]:
-        """Regression matrix J, shape (c, 6): reading = J [alpha; p] + centripetal terms.
+        """Regression matrix J, shape (c, 6), of reading = J [alpha; p] + centripetal terms.
 
         Row i is [(r_i × θ_i)ᵀ, θ_iᵀ] (GF-IMU paper, step 4); lengths in m.
         """
@@ -160,7 +160,7 @@ class AccelerometerArray:
 
     @cached_property
     def centripetal_matrix(self) -> NDArray[np.float64]:
-        """Matrix Q, shape (c, 6): Q s = θ_iᵀ (ωωᵀ − |ω|² I) r_i with s the products `OMEGA_PRODUCTS` of ω."""
+        """Matrix Q, shape (c, 6), of ``Q s = θ_iᵀ (ωωᵀ − |ω|² I) r_i`` with s the products `OMEGA_PRODUCTS` of ω."""
         x, y, z = self.positions.T
         a, b, c = self.axes.T
         return np.column_stack(

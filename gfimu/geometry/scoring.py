@@ -7,7 +7,7 @@ of a regression matrix mean nothing without it (GF-IMU paper, step 6, quotes L/2
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
@@ -20,9 +20,19 @@ from gfimu.errors import InputError
 from gfimu.geometry.array import OMEGA_PRODUCTS, AccelerometerArray
 from gfimu.geometry.dilution import gdop, gdop_lower_bound
 from gfimu.geometry.kinematics import MOTION_NAMES, joint_covariance, null_space, omega_leakage, require_all_motions
+from gfimu.results import Panel, PlottedResult, Series, result_html
 from gfimu.short_repr import short_repr
 
-__all__ = ["DEFAULT_NOISE_STD", "Protection", "Score", "gdop", "gdop_lower_bound", "ranking_remark", "score"]
+__all__ = [
+    "DEFAULT_NOISE_STD",
+    "Protection",
+    "Score",
+    "gdop",
+    "gdop_lower_bound",
+    "ranking_remark",
+    "score",
+    "score_panels",
+]
 
 DEFAULT_NOISE_STD = 0.0287
 """Channel noise at which rate bounds are quoted, m/s²: ADXL345, x and y axes at 100 Hz (0.75 LSB of 3.9 mg)."""
@@ -39,7 +49,7 @@ class Protection(Protocol):
 
 
 @dataclass(frozen=True)
-class Score:
+class Score(PlottedResult):
     """Figures of merit of one array.
 
     Parameters
@@ -94,6 +104,58 @@ class Score:
     protection: Protection | None = None
 
     __repr__ = short_repr
+
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """Return the figures as one row, units in the names; without a unit: pure numbers in the length unit."""
+        numbers: dict[str, Any] = {
+            "channels": self.n_channels,
+            "length_unit_m": self.length_unit_m,
+            "condition_number": self.condition_number,
+            "gdop": self.gdop,
+            "gdop_joint": self.gdop_joint,
+            "null_space_rank": self.null_space_rank,
+        }
+        numbers |= {f"sigma_alpha_{axis}": float(one) for axis, one in zip("xyz", self.sigma_alpha, strict=True)}
+        numbers |= {f"sigma_p_{axis}": float(one) for axis, one in zip("xyz", self.sigma_p, strict=True)}
+        leakage = zip(MOTION_NAMES, self.omega_squared_leakage, strict=True)
+        numbers |= {f"omega_squared_leakage_{name}": float(one) for name, one in leakage}
+        numbers |= {f"omega_{axis}_rad_s": float(one) for axis, one in zip("xyz", self.omega_rad_s, strict=True)}
+        numbers["noise_m_s2"] = self.noise_m_s2
+        bounds = zip("xyz", self.rate_bound_rad_s, strict=True)
+        numbers |= {f"rate_bound_{axis}_rad_s": float(one) for axis, one in bounds}
+        return {"array": np.array([self.name], dtype=object)} | {key: np.array([one]) for key, one in numbers.items()}
+
+    def _heading(self) -> str:
+        return f"Score of {self.name}"
+
+    def _facts(self) -> list[tuple[str, str]]:
+        def three(values: NDArray[np.float64]) -> str:
+            return ", ".join("∞" if np.isinf(one) else f"{one:.4g}" for one in values)
+
+        terms = "; ".join(f"{name}: {text}" for name, text in self.omega_squared_terms.items())
+        return [
+            ("array", self.description or self.name),
+            ("channels", str(self.n_channels)),
+            ("length unit", f"{self.length_unit_m:g} m"),
+            ("condition number κ", f"{self.condition_number:.4f}"),
+            ("GDOP", f"{self.gdop:.4f}"),
+            ("GDOP with ω² free", f"{self.gdop_joint:.4f}"),
+            ("σ of α per unit of channel noise (x, y, z)", three(self.sigma_alpha)),
+            ("σ of p per unit of channel noise (x, y, z)", three(self.sigma_p)),
+            ("terms of ω² in α and p", terms or "none"),
+            ("products of ω that the null space sees", f"{self.null_space_rank} of 6"),
+            (
+                f"rate bound of one sample at ω = ({three(self.omega_rad_s)}) rad/s",
+                f"({three(self.rate_bound_rad_s)}) rad/s",
+            ),
+            ("channel noise of that bound", f"{self.noise_m_s2:g} m/s²"),
+        ]
+
+    def _repr_html_(self) -> str:
+        return result_html(self._heading(), self._facts(), None)
+
+    def _panels(self) -> list[Panel]:
+        return score_panels([self])
 
     @property
     def omega_squared_terms(self) -> dict[str, str]:
@@ -168,11 +230,43 @@ def score(
     return [_score(array, length_unit_m or array.length_unit, omega, noise_m_s2) for array in loaded]
 
 
+def score_panels(scores: Sequence[Score]) -> list[Panel]:
+    """Return the picture of one or several scores side by side: σ per component, what ω² leaves, GDOP, rate bound."""
+    components = tuple(f"{quantity}{axis}" for quantity in ("α", "p") for axis in "xyz")
+    names = tuple(score.name for score in scores)
+
+    def finite(values: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]:
+        numbers = np.asarray(values, dtype=float)
+        return np.where(np.isfinite(numbers), numbers, np.nan)
+
+    def by_array(values: Callable[[Score], NDArray[np.float64]]) -> tuple[Series, ...]:
+        return tuple(Series(score.name, finite(values(score)), chip=place) for place, score in enumerate(scores))
+
+    sigma = by_array(lambda score: np.concatenate([score.sigma_alpha, score.sigma_p]))
+    merit = (
+        Series("GDOP", finite([score.gdop for score in scores]), chip=0),
+        Series("GDOP with ω² free", finite([score.gdop_joint for score in scores]), chip=1),
+        Series("κ", finite([score.condition_number for score in scores]), chip=2),
+    )
+    bound = by_array(lambda score: score.rate_bound_rad_s)
+    return [
+        Panel(
+            "σ of each component",
+            "σ per unit of channel noise\n(length unit of the array)",
+            sigma,
+            components,
+            scale="zero",
+        ),
+        Panel("figures of merit", "pure number", merit, names, scale="zero"),
+        Panel("rate bound of one sample", "σ of ω, rad/s", bound, ("ωx", "ωy", "ωz"), scale="zero"),
+    ]
+
+
 def ranking_remark(scores: Sequence[Score]) -> str:
     """Return a sentence where κ and GDOP rank arrays differently, empty where they agree.
 
     The GF-IMU paper's appendix claims that all its alternatives have larger κ and GDOP than the cube; for κ that is
-    false of P1 and P2, whose κ is 1 (`docs/geometry.md`).
+    false of P1 and P2, whose κ is 1 (`docs/theory/geometry.md`).
 
     Parameters
     ----------

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gfimu.errors import InputError
 from gfimu.importing.clock import Times, times_of
@@ -17,6 +18,7 @@ from gfimu.importing.oddities import oddities
 from gfimu.importing.raw_table import RawFile, RawTable
 from gfimu.importing.readers import read_foreign
 from gfimu.importing.recognise import fitting_maps, own_chips
+from gfimu.results import TableResult, text_column
 from gfimu.units import REFERENCE_UNITS, TIME_COLUMNS
 
 __all__ = ["ColumnView", "Inspection", "inspect_file"]
@@ -50,7 +52,7 @@ class ColumnView:
 
 
 @dataclass(frozen=True)
-class Inspection:
+class Inspection(TableResult):
     """What a file seems to hold.
 
     Parameters
@@ -92,6 +94,32 @@ class Inspection:
     sample_rate_hz: float = float("nan")
     chips: int = 0
     is_own: bool = False
+
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """Return one row per column of the file: range, median, missing values, and what it seems to be."""
+        numbers = {
+            key: np.array([getattr(one, key) for one in self.columns]) for key in ("least", "median", "most", "missing")
+        }
+        return {
+            "column": text_column(one.name for one in self.columns),
+            **numbers,
+            "role": text_column(one.role for one in self.columns),
+        }
+
+    def _heading(self) -> str:
+        return f"Inspection of {self.source}"
+
+    def _facts(self) -> list[tuple[str, str]]:
+        return [
+            ("format", self.format),
+            ("rows", str(self.rows)),
+            ("sample rate", f"{self.sample_rate_hz:.4g} Hz"),
+            ("triads of accelerations", str(self.chips)),
+            ("maps that fit", ", ".join(self.fitting) or "none"),
+        ]
+
+    def _notes(self) -> tuple[str, ...]:
+        return self.findings
 
     def map_text(self) -> str:
         """Return the suggested map as a TOML file with the reasons as comments."""

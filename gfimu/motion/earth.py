@@ -67,7 +67,7 @@ class EarthRotation:
 
     @property
     def horizontal_rate(self) -> float:
-        """Ω_E cos φ, rad/s: the part that tilts a unit that takes the Earth for still."""
+        """Ω_E cos φ, rad/s, the part that tilts a unit that takes the Earth for still."""
         return EARTH_RATE * math.cos(math.radians(self.latitude_deg))
 
     def to_dict(self) -> dict[str, Any]:

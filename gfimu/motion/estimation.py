@@ -19,7 +19,7 @@ from scipy.spatial.transform import Rotation
 from gfimu import __version__
 from gfimu.errors import InputError
 from gfimu.files.column_file import open_columns, write_columns
-from gfimu.files.table import ArrowStream, Tabular
+from gfimu.files.table import ArrowStream
 from gfimu.geometry.array import OMEGA_PRODUCTS, AccelerometerArray
 from gfimu.geometry.linear_solution import linear_solution
 from gfimu.motion.attitude import from_rotation, integrate_attitude, table_angle, to_rotation
@@ -42,6 +42,7 @@ from gfimu.recording import Recording
 from gfimu.recording.carried_array import array_metadata
 from gfimu.recording.checks import Finding, check_recording, refuse_or_warn, without_dead_channels
 from gfimu.recording.clipping import without_clipped
+from gfimu.results import Panel, PlottedResult, Series, axis_series
 from gfimu.short_repr import joined, timing
 from gfimu.units import STANDARD_GRAVITY
 
@@ -53,7 +54,7 @@ _LEVEL_SECONDS = 1.0
 
 
 @dataclass(frozen=True)
-class Estimate(Tabular):
+class Estimate(PlottedResult):
     """Motion of the body at each sample of a recording; NaN where it could not be found.
 
     Parameters
@@ -107,6 +108,50 @@ class Estimate(Tabular):
     def __repr__(self) -> str:
         names = [str(self.metadata[key]) for key in ("array", "method") if key in self.metadata]
         return joined(self, [*names, timing(self.t_s), "with position" if self.position is not None else ""])
+
+    def _facts(self) -> list[tuple[str, str]]:
+        facts = [(key, str(self.metadata[key])) for key in ("array", "method", "form") if key in self.metadata]
+        known = np.flatnonzero(np.isfinite(self.omega).all(axis=1))
+        facts.append(("samples", timing(self.t_s)))
+        if known.size:
+            last = known[-1]
+            rate, std = (", ".join(f"{one:.4g}" for one in values[last]) for values in (self.omega, self.omega_std))
+            facts += [("rate at the end", f"({rate}) rad/s"), ("its standard deviation", f"({std}) rad/s")]
+        turned = self.angle[np.isfinite(self.angle)]
+        if turned.size:
+            facts.append(("angle turned", f"{turned[-1]:.5g} rad"))
+        excluded = [name for name, health in (self.health or {}).items() if (health == 1).any()]
+        return [*facts, ("channels excluded", ", ".join(excluded))] if excluded else facts
+
+    def _notes(self) -> tuple[str, ...]:
+        return tuple(str(one) for one in self.metadata.get("warnings", ()))
+
+    def _panels(self) -> list[Panel]:
+        panels = [
+            Panel("angular rate", "ω, rad/s", axis_series(self.omega, self.omega_std), self.t_s),
+            Panel("angular acceleration", "α, rad/s²", axis_series(self.alpha), self.t_s),
+            Panel("specific force of the origin", "p, m/s²", axis_series(self.p), self.t_s),
+            Panel("angle about the table's axis", "angle, rad", (Series("", self.angle),), self.t_s),
+        ]
+        for title, label, values in (
+            ("velocity in the world", "velocity, m/s", self.velocity),
+            ("position in the world", "position, m", self.position),
+        ):
+            if values is not None:
+                panels.append(Panel(title, label, axis_series(values), self.t_s))
+        return panels
+
+    def to_rerun(self, path: str | Path) -> Path:
+        """Write the run as a rerun recording, ``.rrd``: the rig in 3-D, channels, and the estimate over time.
+
+        Raises
+        ------
+        InputError
+            If the name does not end in ``.rrd``, its folder can't be written to, or the array is not known.
+        """
+        import gfimu  # pictures stand above what they show
+
+        return gfimu.view(self, out=path)
 
     def to_columns(self) -> dict[str, NDArray[Any]]:
         """Return the columns of the Estimate file, by name with unit."""

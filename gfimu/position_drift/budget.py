@@ -27,6 +27,7 @@ from gfimu.position_drift.closed_forms import (
     position_from_impulse,
     position_from_rate,
 )
+from gfimu.results import Panel, PlottedResult, Series, text_column
 from gfimu.short_repr import short_repr
 from gfimu.units import STANDARD_GRAVITY
 
@@ -79,7 +80,7 @@ class DriftTerm:
 
 
 @dataclass(frozen=True)
-class DriftBudget:
+class DriftBudget(PlottedResult):
     """Position error after a time, cause by cause.
 
     Parameters
@@ -130,6 +131,41 @@ class DriftBudget:
     format_version: int = _FORMAT_VERSION
 
     __repr__ = short_repr
+
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """Return one row per cause: its size, standard deviations of the position error, share of the variance."""
+        std = np.array([term.std for term in self.terms]).reshape(-1, 3)
+        return {
+            "cause": text_column(term.name for term in self.terms),
+            "form_at_rest": text_column(term.form for term in self.terms),
+            "size": np.array([term.size for term in self.terms]),
+            "size_unit": text_column(term.size_unit for term in self.terms),
+            **{f"std_{axis}_m": std[:, place] for place, axis in enumerate("xyz")},
+            "share": np.array([term.share for term in self.terms]),
+        }
+
+    def _heading(self) -> str:
+        return f"Position drift of {self.array} after {self.time:g} s"
+
+    def _facts(self) -> list[tuple[str, str]]:
+        total = ", ".join(f"{one:.3g}" for one in self.total_std)
+        validity = "" if self.valid else " (exceeded: the figures are of first order)"
+        return [
+            ("position error, σ of x, y, z", f"({total}) m"),
+            ("mean fall by tilt", f"{self.fall:.3g} m"),
+            ("tilt, σ", f"{self.tilt_std:.3g} rad"),
+            ("first-order forms hold until", f"{self.valid_until:.4g} s{validity}"),
+        ]
+
+    def _notes(self) -> tuple[str, ...]:
+        return (self.note,) if self.note else ()
+
+    def _panels(self) -> list[Panel]:
+        names = (*(term.name for term in self.terms), "total")
+        std = np.vstack([*(term.std for term in self.terms), self.total_std])
+        std = np.where(std > 0.0, std, np.nan)
+        series = tuple(Series(axis, std[:, place], role=axis) for place, axis in enumerate("xyz"))
+        return [Panel(f"position error after {self.time:g} s, by cause", "σ, m", series, names, scale="log")]
 
     @property
     def total_std(self) -> NDArray[np.float64]:

@@ -4,16 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import matplotlib as mpl
 import numpy as np
+from matplotlib.figure import Figure
 
 from gfimu.files.atomic_file import atomic_path
 from gfimu.position_drift.rest_windows import RestDrift
 from gfimu.visual.colours import AFTER_ON_PAPER, INK, PALE, css
-
-mpl.use("Agg")
-
-from matplotlib.figure import Figure
 
 __all__ = ["rest_drift_picture"]
 

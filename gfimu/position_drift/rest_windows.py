@@ -30,6 +30,7 @@ from gfimu.position_drift.closed_forms import position_from_rate
 from gfimu.rate.integration import integrate_rate
 from gfimu.recording import Recording
 from gfimu.recording.rest import detect_rest
+from gfimu.results import Panel, PlottedResult, Series
 from gfimu.sensor_noise import RecordingNoise, recording_noise
 from gfimu.sensor_noise.identification import TERMS, term_spectra
 from gfimu.short_repr import short_repr
@@ -46,7 +47,7 @@ _PADDING = 4  # numerical: length of the Fourier transform, of that of the weigh
 
 
 @dataclass(frozen=True)
-class RestDrift:
+class RestDrift(PlottedResult):
     """Position errors of a unit at rest, window by window, and what the noise of the recording predicts.
 
     Parameters
@@ -87,6 +88,39 @@ class RestDrift:
     gravity: float
 
     __repr__ = short_repr
+
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """Return one row per window: its start, the final position error and its predicted standard deviation."""
+        columns = {"start_s": self.start_s}
+        for name, values in (("position", self.final_m), ("predicted_std", self.predicted_std_m[:, -1])):
+            columns |= {f"{name}_{axis}_m": values[:, place] for place, axis in enumerate("xyz")}
+        return columns
+
+    def _heading(self) -> str:
+        return f"Position error of {self.array} at rest after {self.time_s:g} s"
+
+    def _facts(self) -> list[tuple[str, str]]:
+        low, high = self.ratio_interval
+        rms, predicted = (", ".join(f"{one:.3g}" for one in values) for values in (self.rms_m, self.predicted_m))
+        return [
+            ("windows", str(len(self.start_s))),
+            ("error, rms of x, y, z", f"({rms}) m"),
+            ("predicted from the noise", f"({predicted}) m"),
+            ("error over prediction", f"{self.ratio:.3g} (95 % of right predictions: {low:.2g} to {high:.2g})"),
+        ]
+
+    def _panels(self) -> list[Panel]:
+        mean = np.mean(self.predicted_mean_m, axis=0)  # (m, 3)
+        std = np.sqrt(np.mean(self.predicted_std_m**2, axis=0))
+        panels = []
+        for place, axis in enumerate("xyz"):
+            predicted = Series("predicted", mean[:, place], std[:, place], x=self.predicted_t_s, role="noise")
+            windows = [
+                Series("navigation" if number == 0 else "", error[:, place], role=axis)
+                for number, error in enumerate(self.error_m)
+            ]
+            panels.append(Panel(f"position error, {axis}", "m", (predicted, *windows), self.t_s))
+        return panels
 
     @property
     def final_m(self) -> Floats:
@@ -182,7 +216,7 @@ def rest_drift(
     GeometryError
         If the array can't see all six motions.
     """
-    for name, value in (("--time", time), ("--lead", lead)):
+    for name, value in (("--duration", time), ("--lead", lead)):
         if not 2.0 <= value * recording.sample_rate < math.inf:
             raise InputError(f"{name} is {value:g} s; it must be two samples or more ({2 / recording.sample_rate:g} s)")
     if not 0.0 < gravity < math.inf:
@@ -314,7 +348,7 @@ def _windows(recording: Recording, readings: Floats, samples: int) -> list[int]:
     if not starts:
         longest = float(rest.lengths.max(initial=0)) / recording.sample_rate
         raise InputError(
-            f"no complete rest of {samples / recording.sample_rate:.4g} s (--lead and --time together); the longest is "
-            f"{longest:.4g} s: record longer at rest, or give a shorter --time or --lead"
+            f"no complete rest of {samples / recording.sample_rate:.4g} s (--lead and --duration together); the "
+            f"longest is {longest:.4g} s: record longer at rest, or give a shorter --duration or --lead"
         )
     return starts

@@ -94,7 +94,7 @@ class LiveRateFilter:
 
     @property
     def current(self) -> KalmanRateFilter:
-        """The filter whose estimates are returned: the winner, or while undecided the first of the two."""
+        """The filter whose estimates are returned, the winner, or while undecided the first of the two."""
         if not self.hypotheses:
             raise InputError("the rate has not stood clear of the biases yet; an unknown start needs that")
         return self.hypotheses[0]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.files.table import Tabular
+from gfimu.results import Panel, PlottedResult, Series, axis_series
 from gfimu.short_repr import joined, timing
 
 __all__ = ["DECIDED", "ChannelReport", "RateEstimate", "SignDecision", "clear_of_zero", "full_covariance", "undecided"]
@@ -86,7 +86,7 @@ class ChannelReport:
 
 
 @dataclass(frozen=True)
-class RateEstimate(Tabular):
+class RateEstimate(PlottedResult):
     """Angular rate and how well it is known.
 
     Parameters
@@ -150,6 +150,22 @@ class RateEstimate(Tabular):
         """Standard deviation of each component of ω, shape (n, 3), rad/s."""
         return np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))
 
+    def _facts(self) -> list[tuple[str, str]]:
+        facts = [("method", self.method), ("samples", timing(self.t_s)), ("sign", self.sign.state)]
+        return [*facts, ("mean NIS per degree of freedom", f"{self.mean_nis:.3g}")]
+
+    def _notes(self) -> list[str]:
+        return self.channels.sentences()
+
+    def _panels(self) -> list[Panel]:
+        panels = [Panel("angular rate", "ω, rad/s", axis_series(self.omega, self.std), self.t_s)]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            per_freedom = np.where(self.nis_dof > 0, self.nis / self.nis_dof, np.nan)
+        if np.isfinite(per_freedom).any():
+            title = "normalised innovation squared"
+            panels.append(Panel(title, "NIS per degree of freedom", (Series("", per_freedom),), self.t_s))
+        return panels
+
     def to_columns(self) -> dict[str, NDArray[Any]]:
         """Return the columns of a table, by name with unit: time, ω and its standard deviation, statistics, rest."""
         columns: dict[str, NDArray[Any]] = {"t_s": self.t_s}
@@ -176,7 +192,7 @@ class RateEstimate(Tabular):
 
     @property
     def mean_nis(self) -> float:
-        """Sum of ``nis`` over the sum of its degrees of freedom: 1 for a filter whose model is right."""
+        """Sum of ``nis`` over the sum of its degrees of freedom, 1 for a filter whose model is right."""
         used = (self.nis_dof > 0) & np.isfinite(self.nis)
         freedom = int(self.nis_dof[used].sum())
         return float(self.nis[used].sum() / freedom) if freedom else float("nan")

@@ -12,7 +12,6 @@ from gfimu.errors import InputError
 from gfimu.files.column_file import ColumnFile, open_columns
 from gfimu.files.input_file import is_there
 from gfimu.files.table import ArrowStream
-from gfimu.files.table_columns import TableColumns
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.importing.recognise import map_hint
 from gfimu.plugins import plugins
@@ -134,7 +133,7 @@ def open_run(
         if recording.array is None:
             raise InputError(f"{path}: the column map names no array; give it with --array")
         return recording, recording.array
-    table = TableColumns(path)  # an Arrow stream can be read only once
+    table = open_columns(path)  # an Arrow stream can be read only once
     own = _own_array(table, None)
     return Recording.read(cast("ArrowStream", table), array=own), own
 
@@ -157,7 +156,8 @@ def _own_array(table: ColumnFile, beside: Path | None) -> AccelerometerArray:
     """Return the array that a recording carries or names."""
     own = carried_array(table.metadata, source=table.file, beside=beside)
     if own is None:
-        raise InputError(f"{table.file}: the recording does not name its array; give it with --array")
+        way = "with --array" if isinstance(table.file, Path) else "as array="
+        raise InputError(f"{table.file}: the recording does not name its array; give it {way}")
     if "array_toml" in table.metadata:
         check_all_channels(table.names, own, table.file)
     return own

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from gfimu.errors import InputError, RecordingWarning
 from gfimu.files.table import ArrowStream, schema_metadata
@@ -26,7 +26,7 @@ from gfimu.recording.carried_array import array_metadata
 from gfimu.recording.filtered import filtered_recording, rows_between, without_rows
 from gfimu.recording.recording import Recording
 
-__all__ = ["MappedFile", "mapped_recording", "mapped_reference"]
+__all__ = ["MappedFile", "RecordingLike", "mapped_recording", "mapped_reference"]
 
 
 @dataclass(frozen=True)
@@ -63,6 +63,11 @@ class MappedFile(os.PathLike[str]):
                 raise InputError(f"{self.others[0]}: several files need a map of their columns (--map)")
             return filtered_recording(self.path, self.column_map, array=array, unit=unit)
         return mapped_recording([self.path, *self.others], self.column_map, array=array)
+
+
+RecordingLike = Recording | str | Path | MappedFile | ArrowStream | tuple[ArrayLike, ArrayLike]
+"""What stands for a recording in the arguments of a command: itself, its file, a table of pandas, polars or pyarrow, or
+times (n,), s, with readings (n, c), m/s²."""
 
 
 def mapped_recording(

@@ -7,28 +7,39 @@ everything is SI. Raw counts stay counts only when asked for (``unit="lsb"``).
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gfimu.errors import InputError, UnitError
 from gfimu.files.column_file import write_columns
-from gfimu.files.table import ArrowStream, Tabular
+from gfimu.files.table import ArrowStream
+from gfimu.files.table_columns import TableColumns
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording.carried_array import array_metadata, carried_array, with_carried_array
 from gfimu.recording.file import read_recording_file
+from gfimu.results import Panel, PlottedResult, Series, axis_series
 from gfimu.short_repr import joined, timing
 
 __all__ = ["Recording"]
 
+_ARRAYS = "NumPy arrays"
+_BARE = re.compile(r"[A-Za-z]+[0-9]+")  # a channel's name without a unit
+_UNIT_WORDS = {"m_s2": "m/s²", "lsb": "counts"}
+
+
+def _few(names: list[str]) -> str:
+    return ", ".join(names) if len(names) <= 4 else f"{', '.join(names[:3])} and {len(names) - 3} more"
+
 
 @dataclass(frozen=True)
-class Recording(Tabular):
+class Recording(PlottedResult):
     """Samples of an accelerometer array and its references.
 
     Parameters
@@ -70,7 +81,7 @@ class Recording(Tabular):
 
     def __repr__(self) -> str:
         name = self.metadata.get("array")
-        unit = {"m_s2": "m/s²", "lsb": "counts"}.get(self.unit, self.unit)
+        unit = _UNIT_WORDS.get(self.unit, self.unit)
         corrupt = sum(self.corrupt.values())
         return joined(
             self,
@@ -83,9 +94,63 @@ class Recording(Tabular):
             ],
         )
 
+    def _facts(self) -> list[tuple[str, str]]:
+        name = self.metadata.get("array")
+        corrupt, gaps = sum(self.corrupt.values()), len(self.gaps) if len(self) > 1 else 0
+        facts = [
+            ("array", name if isinstance(name, str) else "not named"),
+            ("channels", f"{len(self.channels)} in {_UNIT_WORDS.get(self.unit, self.unit)}"),
+            ("samples", timing(self.t_s)),
+            ("references", ", ".join(self.reference) or "none"),
+            ("further columns", _few(list(self.extra))),
+            ("lost", f"{gaps} gaps in time" if gaps else ""),
+            ("corrupt values left out", str(corrupt) if corrupt else ""),
+        ]
+        facts += [(key, str(self.metadata[key])) for key in ("scenario", "seed", "calibration") if key in self.metadata]
+        return [(word, value) for word, value in facts if value]
+
+    def _panels(self) -> list[Panel]:
+        chips = list(dict.fromkeys(channel[:-1] for channel in self.channels))
+        unit = _UNIT_WORDS.get(self.unit, self.unit)
+        panels = []
+        for axis in dict.fromkeys(channel[-1] for channel in self.channels):
+            series = tuple(
+                Series(name, self.readings[:, place], chip=chips.index(name[:-1]))
+                for place, name in enumerate(self.channels)
+                if name[-1] == axis
+            )
+            panels.append(Panel(f"axis {axis} of each chip", f"specific force, {unit}", series, self.t_s))
+        rates = tuple(
+            Series(name.removesuffix("_rad_s"), self.reference[name], style=style)
+            for name, style in (("tacho_rad_s", "line"), ("command_rad_s", "dashes"))
+            if name in self.reference
+        )
+        if rates:
+            panels.append(Panel("reference rate", "rate, rad/s", rates, self.t_s))
+        gyro = [self.reference.get(f"gyro_{axis}_rad_s") for axis in "xyz"]
+        if all(one is not None for one in gyro):
+            vectors = np.column_stack([one for one in gyro if one is not None])
+            panels.append(Panel("reference gyro", "rate, rad/s", axis_series(vectors), self.t_s))
+        for name, label in (("angle_rad", "angle, rad"), ("temperature_degC", "temperature, °C")):
+            if name in self.reference:
+                panels.append(Panel(label.partition(",")[0], label, (Series("", self.reference[name]),), self.t_s))
+        return panels
+
+    def to_rerun(self, path: str | Path) -> Path:
+        """Write the run as a rerun recording, ``.rrd``: the rig in 3-D, channels, and the estimate over time.
+
+        Raises
+        ------
+        InputError
+            If the name does not end in ``.rrd``, its folder can't be written to, or the array is not known.
+        """
+        import gfimu  # pictures stand above what they show
+
+        return gfimu.view(self, out=path)
+
     @property
     def sample_period(self) -> float:
-        """Nominal sample period: the median step of the times, s."""
+        """Nominal sample period, the median step of the times, s."""
         if len(self.t_s) < 2:
             raise InputError("a recording of fewer than two samples has no sample rate; record longer")
         return float(np.median(np.diff(self.t_s)))
@@ -239,20 +304,112 @@ class Recording(Tabular):
         return columns | dict(self.reference) | dict(self.extra)
 
     @classmethod
+    def from_table(
+        cls,
+        table: ArrowStream,
+        *,
+        array: AccelerometerArray | str | None = None,
+        units: str | Mapping[str, str] | None = None,
+        unit: str = "m_s2",
+    ) -> Recording:
+        """Build a recording from a table of pandas, polars or pyarrow, with the checks of a file.
+
+        Parameters
+        ----------
+        table : table
+            One row per sample: ``t_s``, a column per channel with its unit in the name (``a11_m_s2``), references.
+            The index of a pandas table that is named ``t_s`` is the time.
+        array : AccelerometerArray or str, optional
+            The array or its name; by default the one in the table's metadata.
+        units : str or mapping of str to str, optional
+            Units of columns that are named without one: one unit for all channels of the array (``"g"``), or one for
+            each column (``{"t": "s", "a11": "g", "tacho": "rpm"}``).
+        unit : {"m_s2", "lsb"}
+            Unit of the readings in memory.
+
+        Raises
+        ------
+        InputError
+            As `Recording.read`; also if ``units`` names a column that the table lacks.
+
+        Examples
+        --------
+        >>> import gfimu
+        >>> run = gfimu.simulate("rest", seed=1)
+        >>> gfimu.Recording.from_table(run.to_pandas()).readings.shape == run.readings.shape
+        True
+        """
+        geometry = AccelerometerArray.load(array) if isinstance(array, str) else array
+        columns = TableColumns(table)
+        if isinstance(units, str):
+            channels = None if geometry is None else geometry.channels
+            bare = [name for name in columns.names if (name in channels if channels else _BARE.fullmatch(name))]
+            columns.rename({name: f"{name}_{units}" for name in bare})
+        elif units is not None:
+            columns.rename({name: f"{name}_{one}" for name, one in units.items()})
+        found = cls._read(columns, geometry, unit)
+        return found if geometry is None else found.carrying(geometry)
+
+    @classmethod
     def from_arrays(
         cls,
         t_s: ArrayLike,
         readings: ArrayLike,
-        array: AccelerometerArray,
+        array: AccelerometerArray | str,
         *,
         reference: Mapping[str, ArrayLike] | None = None,
         metadata: Mapping[str, Any] | None = None,
+        unit: str = "m_s2",
     ) -> Recording:
-        """Build a recording from times (n,), readings (n, c) in m/s² and references, each (n,)."""
-        return cls(
-            np.asarray(t_s, dtype=float),
-            np.asarray(readings, dtype=float),
-            array.channels,
-            {key: np.asarray(value, dtype=float) for key, value in (reference or {}).items()},
-            {**array_metadata(array), **(metadata or {})},
-        )
+        """Build a recording from NumPy arrays, with the checks of a file.
+
+        Parameters
+        ----------
+        t_s : array_like, shape (n,)
+            Sample times, s, strictly increasing.
+        readings : array_like, shape (n, c)
+            Readings in the channel order of the array; NaN where a channel is missing in a sample.
+        array : AccelerometerArray or str
+            The array or its name.
+        reference : mapping of str to array_like, shape (n,), optional
+            References by column name with unit: ``tacho_rad_s``, ``gyro_x_rad_s``.
+        metadata : mapping, optional
+            Further metadata of the recording.
+        unit : {"m_s2", "g", "mg", "lsb"}
+            Unit of ``readings``; in memory all but ``lsb`` become m/s².
+
+        Raises
+        ------
+        InputError
+            If the shapes don't fit, the times do not increase, or most readings are impossible for their unit.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import gfimu
+        >>> cube = gfimu.AccelerometerArray.load("cube12")
+        >>> level = np.tile(cube.axes @ [0.0, 0.0, 1.0], (200, 1))
+        >>> gfimu.Recording.from_arrays(np.arange(200) / 100.0, level, "cube12", unit="g")
+        Recording(cube12, 12 channels in m/s², 200 samples, 1.99 s at 100 Hz)
+        """
+        geometry = AccelerometerArray.load(array) if isinstance(array, str) else array
+        time, values = np.asarray(t_s, dtype=float), np.asarray(readings, dtype=float)
+        if time.ndim != 1 or values.shape != (len(time), geometry.n_channels):
+            raise InputError(
+                f"{_ARRAYS}: times have shape {time.shape} and readings {values.shape}; array {geometry.name!r} needs "
+                f"times (n,) and readings (n, {geometry.n_channels})"
+            )
+        columns: dict[str, Any] = {"t_s": time}
+        columns |= {f"{name}_{unit}": values[:, place] for place, name in enumerate(geometry.channels)}
+        columns |= {name: np.asarray(value, dtype=float) for name, value in (reference or {}).items()}
+        for name, value in columns.items():
+            if value.shape != time.shape:
+                raise InputError(
+                    f"{_ARRAYS}: {name} has shape {value.shape}; it needs one value per sample, {time.shape}"
+                )
+        table = TableColumns.of(columns, {**array_metadata(geometry), **(metadata or {})}, _ARRAYS)
+        return cls._read(table, geometry, "lsb" if unit == "lsb" else "m_s2")
+
+    @classmethod
+    def _read(cls, table: TableColumns, array: AccelerometerArray | None, unit: str) -> Recording:
+        return cls.read(cast("ArrowStream", table), array=array, unit=unit)

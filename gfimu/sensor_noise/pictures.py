@@ -5,16 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-import matplotlib as mpl
 import numpy as np
+from matplotlib.figure import Figure
 
 from gfimu.files.atomic_file import atomic_path
 from gfimu.sensor_noise.recording_noise import RecordingNoise
 from gfimu.visual.colours import STYLES, chip_colour, css
-
-mpl.use("Agg")
-
-from matplotlib.figure import Figure
 
 __all__ = ["noise_picture"]
 

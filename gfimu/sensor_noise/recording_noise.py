@@ -14,6 +14,7 @@ from gfimu.errors import InputError, unknown_name
 from gfimu.recording import Recording
 from gfimu.recording.reference_times import reference_series
 from gfimu.recording.rest import detect_rest
+from gfimu.results import Panel, PlottedResult, Series, text_column
 from gfimu.sensor_noise.identification import TERMS, NoiseModel, identify_noise
 from gfimu.short_repr import short_repr
 from gfimu.units import TIME_COLUMNS
@@ -27,8 +28,11 @@ STRETCHES = ("rest", "all")
 """Which samples to use: the longest rest without a gap, or everything up to the first gap."""
 
 
+_UNIT_WORDS = {"m_s2": "m/s²", "lsb": "counts"}
+
+
 @dataclass(frozen=True)
-class RecordingNoise:
+class RecordingNoise(PlottedResult):
     """Noise models of the channels of a recording.
 
     Parameters
@@ -53,6 +57,44 @@ class RecordingNoise:
     about_axis: AxisNoise | None = None
 
     __repr__ = short_repr
+
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """Return one row per channel and term that was found: value, its interval, and the unit of the coefficient."""
+        rows = [(name, term) for name, model in self.models.items() for term in model.terms.values() if term.found]
+        unit = _UNIT_WORDS.get(self.unit, self.unit)
+        readings = {name: "rad/s" if name in self.gyros else unit for name in self.models}
+        numbers = {key: np.array([getattr(term, key) for _, term in rows]) for key in ("value", "low", "high", "std")}
+        return {
+            "channel": text_column(name for name, _ in rows),
+            "term": text_column(term.symbol for _, term in rows),
+            "meaning": text_column(term.name for _, term in rows),
+            **numbers,
+            "unit": text_column(f"{readings[name]}{TERMS[term.symbol][1]}" for name, term in rows),
+        }
+
+    def _heading(self) -> str:
+        return "Noise at rest"
+
+    def _facts(self) -> list[tuple[str, str]]:
+        stretch = f"{self.duration_s:.4g} s from {self.start_s:.4g} s on, at {self.rate:.4g} Hz"
+        return [("channels", ", ".join(self.models)), ("stretch", stretch)]
+
+    def _panels(self) -> list[Panel]:
+        groups = (
+            ("specific force", self.accelerometers, _UNIT_WORDS.get(self.unit, self.unit)),
+            ("angular rate", self.gyros, "rad/s"),
+        )
+        panels = []
+        for title, models, unit in groups:
+            stems = list(dict.fromkeys(name[:-1] for name in models))
+            series = tuple(
+                Series(name, model.allan.deviation, x=model.allan.tau, chip=stems.index(name[:-1]))
+                for name, model in models.items()
+            )
+            if series:
+                label = f"Allan deviation, {unit}"
+                panels.append(Panel(f"{title} at rest", label, series, np.empty(0), "averaging time τ, s", scale="log"))
+        return panels
 
     def sample_std(self, channels: Sequence[str]) -> NDArray[np.float64]:
         """Return the standard deviation of one sample that the white noise N gives each channel, shape (c,)."""

@@ -19,6 +19,7 @@ __all__ = [
     "AFTER",
     "AFTER_ON_PAPER",
     "AXES",
+    "AXES_ON_PAPER",
     "BACKGROUND",
     "BEFORE",
     "BEFORE_ON_PAPER",
@@ -32,6 +33,7 @@ __all__ = [
     "MEASURED",
     "METAL",
     "NOISE_ON_PAPER",
+    "PAGE",
     "PALE",
     "SEPARATED",
     "SPIN_AXIS",
@@ -51,6 +53,7 @@ Colour = tuple[int, int, int] | tuple[int, int, int, int]
 """Red, green, blue and optionally opacity, each 0 to 255."""
 
 AXES: tuple[Colour, Colour, Colour] = ((213, 60, 60), (150, 225, 120), (70, 130, 250))
+AXES_ON_PAPER: tuple[Colour, Colour, Colour] = ((180, 30, 40), (96, 178, 60), (36, 72, 190))
 TRUTH: Colour = (165, 168, 174)
 ESTIMATE: Colour = (240, 140, 20)
 ESTIMATE_BAND: Colour = (196, 146, 88)
@@ -88,6 +91,47 @@ TONES: Mapping[str, Colour] = {
 }
 """Of the verdicts of a diagnosis, which are written beside them."""
 
+PAGE: Mapping[str, Mapping[str, Colour]] = {
+    "light": {
+        "ground": (244, 245, 247),
+        "card": (255, 255, 255),
+        "code": (238, 240, 243),
+        "pressed": (226, 232, 240),
+        "ink": INK,
+        "quiet": (93, 100, 112),
+        "line": (223, 227, 232),
+        "edge": (138, 143, 152),
+        "focus": (28, 95, 168),
+        "band": PALE,
+        "noise": NOISE_ON_PAPER,
+        "before": BEFORE_ON_PAPER,
+        "after": AFTER_ON_PAPER,
+        "spin-axis": SPIN_AXIS_ON_PAPER,
+        **TONES,
+    },
+    "dark": {
+        "ground": (17, 19, 23),
+        "card": BACKGROUND,
+        "code": (42, 46, 54),
+        "pressed": (54, 62, 74),
+        "ink": (228, 231, 236),
+        "quiet": (160, 167, 178),
+        "line": (54, 59, 68),
+        "edge": (112, 119, 131),
+        "focus": (120, 180, 250),
+        "band": (66, 72, 82),
+        "noise": MEASURED,
+        "before": BEFORE,
+        "after": AFTER,
+        "spin-axis": SPIN_AXIS,
+        "calm": (88, 196, 150),
+        "found": (110, 175, 245),
+        "open": (226, 166, 40),
+        "alarm": (245, 125, 118),
+    },
+}
+"""Of an HTML page by day and by night, by the names of its style sheet; a name means the same in both."""
+
 HEALTH: Mapping[str, Colour] = {
     "not watched": (104, 110, 120),
     "used": (40, 130, 96),
@@ -102,6 +146,7 @@ HEALTH: Mapping[str, Colour] = {
 SEPARATED: Mapping[str, Mapping[str, Colour]] = {
     "run": {"truth": TRUTH, "estimate": ESTIMATE, "tacho": TACHO, "command": COMMAND},
     "body axes": dict(zip("xyz", AXES, strict=True)),
+    "body axes on paper": dict(zip("xyz", AXES_ON_PAPER, strict=True)),
     "comparison": {"measured": MEASURED, "before": BEFORE, "after": AFTER},
     "report": {"noise": NOISE_ON_PAPER, "before": BEFORE_ON_PAPER, "after": AFTER_ON_PAPER, "ink": INK},
 }

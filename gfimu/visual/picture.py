@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from gfimu.errors import GeometryError, InputError
+from gfimu.files.table import ArrowStream
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.geometry.turning_axis import TurningAxis
 from gfimu.known_axis.estimation import estimate_about_axis
@@ -23,8 +24,10 @@ from gfimu.visual.run import write_estimate, write_run
 __all__ = ["picture_of", "picture_path"]
 
 
-def picture_path(recording: Path) -> Path:
-    """Where the picture of a recording goes: beside it, or in a temporary folder if that can't be written to."""
+def picture_path(recording: Path | None) -> Path:
+    """Where the picture of a recording goes: beside its file, or in a temporary folder if that can't be written to."""
+    if recording is None:
+        return Path(tempfile.mkdtemp(prefix="gfimu-")) / "run.view.rrd"
     name = f"{recording.name.split('.')[0]}.view.rrd"
     if os.access(recording.parent, os.W_OK):
         return recording.parent / name
@@ -32,21 +35,21 @@ def picture_path(recording: Path) -> Path:
 
 
 def picture_of(
-    recording: Path | MappedFile,
+    recording: Recording | Estimate | str | Path | MappedFile | ArrowStream,
     out: Path,
     *,
     array: AccelerometerArray | None = None,
     axis: TurningAxis | None = None,
     force: bool = False,
 ) -> None:
-    """Write the rerun recording of a recording file, with its estimate where the array sees all six motions.
+    """Write the rerun recording of a recording, with its estimate where the array sees all six motions.
 
     A file that `gfimu estimate` wrote is drawn as it is.
 
     Parameters
     ----------
-    recording : Path or MappedFile
-        Recording, in any format that `gfimu.recording.formats.open_run` reads.
+    recording : Recording, Estimate, path or table
+        A recording, or its file in any format that `gfimu.recording.formats.open_run` reads; or an estimate.
     out : Path
         File to write, ``.rrd``.
     array : AccelerometerArray, optional
@@ -61,15 +64,15 @@ def picture_of(
     InputError
         If the recording can't be read, names no array, is refused by its checks, or the picture can't be written.
     """
-    name = Path(recording)
+    name = Path(recording) if isinstance(recording, str | Path | MappedFile) else Path()
     if name.suffix == ".rrd":
         raise InputError(f"{recording}: already a rerun recording; open it without --out")
-    if not isinstance(recording, MappedFile) and is_estimate(recording):
+    if isinstance(recording, Estimate) or (isinstance(recording, str | Path) and is_estimate(recording)):
         if axis is not None:
-            raise InputError(f"{recording}: an estimate, which an axis can't change; give its recording with --axis")
-        _picture_of_estimate(name, out, array)
+            raise InputError(f"{name}: an estimate, which an axis can't change; give its recording with --axis")
+        _picture_of_estimate(name, recording if isinstance(recording, Estimate) else Estimate.read(name), out, array)
         return
-    run, geometry = open_run(recording, array)
+    run, geometry = _with_array(recording, array)
     examine(run, geometry, source=name.name, force=force)
     if axis is not None:
         geometry = replace(geometry, turning_axis=axis)
@@ -79,9 +82,20 @@ def picture_of(
     write_run(out, run, geometry, estimate=found, notes=note, title=name.stem)
 
 
-def _picture_of_estimate(file: Path, out: Path, array: AccelerometerArray | None) -> None:
-    """Write the rerun recording of a file that `gfimu estimate` wrote."""
-    found = Estimate.read(file)
+def _with_array(
+    recording: Recording | str | Path | MappedFile | ArrowStream, array: AccelerometerArray | None
+) -> tuple[Recording, AccelerometerArray]:
+    """Return a recording with its array."""
+    if not isinstance(recording, Recording):
+        return open_run(recording, array)
+    geometry = array or recording.array
+    if geometry is None:
+        raise InputError("the recording does not carry its array; give it as array=")
+    return recording, geometry
+
+
+def _picture_of_estimate(file: Path, found: Estimate, out: Path, array: AccelerometerArray | None) -> None:
+    """Write the rerun recording of an estimate, and of the file that it is from, if it is from one."""
     geometry = carried_array(found.metadata, source=file, beside=file.parent) if array is None else array
     if geometry is None:
         raise InputError(f"{file}: the estimate does not name its array; give it with --array")

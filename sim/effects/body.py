@@ -17,7 +17,24 @@ _DEGREE = np.pi / 180.0
 
 
 class ChipDelay(Effect):
-    """Chips that are sampled late, each by a delay of its own."""
+    """Chips that are sampled late, each by a delay of its own.
+
+    The chips are not triggered together: each gives its latest sample when it is asked, or has a filter with another
+    group delay.
+
+    Notes
+    -----
+    :formula: y = f(t + δ)
+    :symbols: δ = {chip}_s
+    :size: 1 ms, by choice: a tenth of the sample period at 100 Hz.
+    :example: a2_s = 0.002, a3_s = -0.001
+    :experiment: Rock the array fast. The residual of a chip is its delay times the rate of change of its reading, the
+        same with both signs of the motion. On a free body only differences between chips are seen: what all share is a
+        delay of the gyro.
+    :recordings: MIMU4444: the channels disagree in proportion to how fast their readings change, as if each chip were
+        sampled at an instant of its own, 1.6 ms rms apart; these delays change from sample to sample, so that this
+        effect, a constant delay, does not explain them.
+    """
 
     name = "chip_delay"
     summary = "chips are sampled late, each by a delay of its own"
@@ -43,7 +60,21 @@ class ChipDelay(Effect):
 
 
 class GyroLatency(Effect):
-    """The gyro that drives the twin is late against the accelerometers."""
+    """The gyro that drives the twin is late against the accelerometers.
+
+    Gyro and accelerometers have filters of different group delay, or the gyro is read after them.
+
+    Notes
+    -----
+    :formula: Ω′ = Ω(t − δ)
+    :symbols: δ = delay_s
+    :size: 2 ms, by choice: group delays of MEMS gyros at bandwidths of some 100 Hz.
+    :example: delay_s = 0.002
+    :experiment: Shake the body about one axis with quick reversals. The disagreement of the channels is in proportion
+        to the rate of change of the centripetal and tangential parts.
+    :recordings: MIMU4444: −1.60 ± 0.02 ms in one recording, −1.62 ± 0.03 ms in the other: the accelerometers lag behind
+        the gyros.
+    """
 
     name = "gyro_latency"
     summary = "the reference gyro is late against the accelerometers (early where negative)"
@@ -61,7 +92,18 @@ class GyroLatency(Effect):
 
 
 class GyroScale(Effect):
-    """The gyro that drives the twin has wrong gains: it reads (1 + ratio)·ω along each axis."""
+    """The gyro that drives the twin has wrong gains: it reads (1 + ratio)·ω along each axis.
+
+    The gains of the reference gyro are off, axis by axis.
+
+    Notes
+    -----
+    :formula: Ω′ = (1 + s)·Ω
+    :symbols: s = {axis}
+    :size: 2 %. MPU-9150: ±3 % by its data sheet.
+    :example: x = 0.02, z = -0.015
+    :experiment: Turn about each axis in turn, at several rates, through a known number of turns.
+    """
 
     name = "gyro_scale"
     summary = "the reference gyro has wrong gains"
@@ -87,7 +129,18 @@ class GyroScale(Effect):
 
 
 class GyroMisalignment(Effect):
-    """The gyro that drives the twin is turned against the body."""
+    """The gyro that drives the twin is turned against the body.
+
+    The gyro chip, or the board that carries it, is turned against the array.
+
+    Notes
+    -----
+    :formula: Ω′ = Ω − n×Ω
+    :symbols: n = {x,y,z}_rad
+    :size: 0.5°, by choice, as of a soldered chip.
+    :example: x_rad = 0.006, y_rad = -0.005
+    :experiment: Turn about each axis in turn: the gyro then shows a share on the other two.
+    """
 
     name = "gyro_misalignment"
     summary = "the reference gyro is turned against the body"

@@ -46,7 +46,22 @@ class _Discrete(Effect):
 
 
 class Noise(_Discrete):
-    """More white noise than the part should have."""
+    """More white noise than the part should have.
+
+    All channels have more white noise than the data sheet's figure: a noisy supply, a lower oversampling than assumed,
+    vibration of the bench.
+
+    Notes
+    -----
+    :formula: σ′ = κ·σ
+    :symbols: κ = factor
+    :size: No prior: it is measured from the scatter. ADXL345 at 100 Hz: 0.75 LSB rms (x, y) and 1.1 LSB (z), LSB = 3.9
+        mg.
+    :example: factor = 2.0
+    :experiment: Record a long rest and compare with the data sheet (`gfimu noise`). At rest on foam, vibration of the
+        bench is gone and noise of the chip stays.
+    :recordings: MIMU4444: the channels' noise at rest is 0.037 m/s² rms.
+    """
 
     name = "noise"
     summary = "more white noise than the part should have"
@@ -60,7 +75,22 @@ class Noise(_Discrete):
 
 
 class BiasRandomWalk(_Discrete):
-    """Biases that follow a random walk."""
+    """Biases that follow a random walk.
+
+    Each offset makes a random walk of its own, which the Allan deviation shows as a rise with the square root of the
+    averaging time.
+
+    Notes
+    -----
+    :formula: mean((y − f)²) = q²·t
+    :symbols: q = strength_m_s2_rts
+    :size: No prior: it is measured. Data sheets of consumer parts do not state it.
+    :example: strength_m_s2_rts = 0.005
+    :experiment: Record an hour at rest at constant temperature and look at the Allan deviation (`gfimu noise`): its
+        right end rises as √τ. An offset that follows the temperature is explained by a thermometer on the chip.
+    :recordings: MIMU4444: z biases with 0.3 mm/s²/√s make the poses of one recording agree with their predictions
+        (variance factor 1.0); the figure was chosen on these recordings.
+    """
 
     name = "bias_random_walk"
     summary = "biases follow a random walk (acceleration random walk)"
@@ -76,8 +106,20 @@ class BiasRandomWalk(_Discrete):
 class Saturation(_Discrete):
     """Clipping below the assumed range: of all channels alike, or of single sides of single channels.
 
+    Readings stop at a level below the range that the twin assumes: a chip set to ±2 g, or an analogue stage that clips
+    first.
+
     ``limit_m_s2`` holds for all channels, above and below, unless levels of channels are given, such as
     ``a11_upper_m_s2`` or ``a11_lower_m_s2``: then only those clip, each at its own level.
+
+    Notes
+    -----
+    :formula: y = clip(f, L₁, L₂)
+    :symbols: L₁ = {channel}_lower_m_s2; L₂ = {channel}_upper_m_s2
+    :size: No prior: the level is read from the samples, which stand still at it.
+    :example: a11_upper_m_s2 = 4.0, a11_lower_m_s2 = -4.0
+    :experiment: Repeat the run at lower rates, where no reading reaches the level: it must agree with the simulation.
+    :recordings: MIMU4444: the gyros clip in 3 % of the samples of the shaken part, the accelerometers need not.
     """
 
     name = "saturation"
@@ -107,7 +149,21 @@ class Saturation(_Discrete):
 
 
 class CoarseResolution(_Discrete):
-    """A larger LSB than assumed."""
+    """A larger LSB than assumed.
+
+    The readings are multiples of a larger step than the part's: the 10-bit mode of an ADXL345, or an export with few
+    digits.
+
+    Notes
+    -----
+    :formula: y = q·round(f/q)
+    :symbols: q = step_m_s2
+    :size: No prior: the step is read from the samples. The ADXL345 at ±16 g in its 10-bit mode has 31.2 mg, in full
+        resolution 3.9 mg.
+    :example: step_m_s2 = 0.306
+    :experiment: Read back the FULL_RES bit of the DATA_FORMAT register; look at the differences of sorted readings
+        (`gfimu inspect`).
+    """
 
     name = "coarse_resolution"
     summary = "a larger LSB than assumed (10-bit mode)"
@@ -120,7 +176,20 @@ class CoarseResolution(_Discrete):
 
 
 class WrongRange(_Discrete):
-    """A chip configured for another range: its readings are off by a power of two."""
+    """A chip configured for another range: its readings are off by a power of two.
+
+    One chip is set to another range than the software assumes, so that its counts are worth 2, 4 or 8 times more or
+    less. κ is the factor on its channels, 1 on the others.
+
+    Notes
+    -----
+    :formula: y = κ·f
+    :symbols: κ = factor
+    :size: Powers of two only.
+    :example: chip = 'a2', factor = 0.5
+    :experiment: Hold the array at rest: the chip reads half or twice gravity. A fault of gain that is no power of two
+        is no wrong range.
+    """
 
     name = "wrong_range"
     summary = "a chip is configured for another range: its readings are off by a power of two"
@@ -138,7 +207,20 @@ class WrongRange(_Discrete):
 
 
 class AxisSwap(_Discrete):
-    """Channels exchanged by wiring."""
+    """Channels exchanged by wiring.
+
+    Two columns of the file hold each other's channel: exchanged wires, or an exchanged order in the software.
+
+    Notes
+    -----
+    :formula: y[i] = f[j];
+        y[j] = f[i]
+    :symbols: i, j = channels
+    :size: None: it is there or not.
+    :example: channels = ['a11', 'a22']
+    :experiment: Put each axis up in turn and see which column reads +1 g. Columns that read alike in the run, as two
+        vertical ones on a table, can be exchanged without a trace.
+    """
 
     name = "axis_swap"
     summary = "channels are exchanged by wiring"
@@ -162,7 +244,18 @@ class AxisSwap(_Discrete):
 
 
 class SignFlip(_Discrete):
-    """A channel inverted by wiring."""
+    """A channel inverted by wiring.
+
+    A column has the wrong sign: a chip mounted upside down, a sign convention of the export.
+
+    Notes
+    -----
+    :formula: y[i] = −f[i]
+    :symbols: i = channel
+    :size: None: it is there or not.
+    :example: channel = 'a33'
+    :experiment: Put each axis up in turn: at rest a channel reads +g along up.
+    """
 
     name = "sign_flip"
     summary = "a channel is inverted"
@@ -178,7 +271,20 @@ class SignFlip(_Discrete):
 
 
 class StuckChannel(_Discrete):
-    """One or several channels frozen for a while."""
+    """One or several channels frozen for a while.
+
+    A channel repeats its last value from t₁ to t₂: a lost bus transfer whose buffer is read again, a chip that stopped
+    converting.
+
+    Notes
+    -----
+    :formula: y[i] = hold(f[i], t₁, t₂)
+    :symbols: i = channel; t₁ = start_s; t₂ = stop_s
+    :size: None: the time is read from the samples.
+    :example: channel = 'a11', start_s = 20.0, stop_s = 25.0
+    :experiment: Look at the raw counts: a live channel has noise of at least a count. Repeat the run; a fault of one
+        chip comes back on the same channel.
+    """
 
     name = "stuck_channel"
     summary = "one or several channels are frozen for a while"
@@ -204,7 +310,20 @@ class StuckChannel(_Discrete):
 
 
 class DroppedFrames(_Discrete):
-    """Lost samples."""
+    """Lost samples.
+
+    Rows are missing: a serial link that is too slow, a host that is busy. Time stamps show a gap of a whole number of
+    periods.
+
+    Notes
+    -----
+    :formula: mean(lost) = p
+    :symbols: p = share
+    :size: None: gaps are read from the time stamps.
+    :example: share = 0.02
+    :experiment: Record at half the rate or over a faster link: gaps by overload go away.
+    :recordings: MIMU4444: none in ten minutes.
+    """
 
     name = "dropped_frames"
     summary = "samples are lost"

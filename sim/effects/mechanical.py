@@ -39,7 +39,23 @@ _WHOLE_INERTIA = 1.25
 
 
 class Misalignment(Effect):
-    """A chip's sensing axes turned against the body."""
+    """A chip's sensing axes turned against the body.
+
+    A chip is soldered or glued askew, so that its three axes are turned together by a small rotation vector against the
+    drawing. Here F is the specific force at the chip.
+
+    Notes
+    -----
+    :formula: y = f + (n×a)·F
+    :symbols: n = {chip}_{axis}_rad
+    :size: 0.5°, what soldering leaves of a package of 3 to 5 mm. The ADXL345's own axes are within 0.1° of square (data
+        sheet).
+    :example: a1_x_rad = 0.01, a1_z_rad = -0.008, a3_y_rad = 0.006
+    :experiment: Put the unit at rest on six faces: each chip then shows gravity in its own axes. Chips against each
+        other are certain; a common turn of all chips needs the faces of the cube as a reference.
+    :recordings: MIMU4444: chips turned on the board by some tenths of a degree; the diagnosis states it as
+        `cross_axis`, which contains a turn.
+    """
 
     name = "misalignment"
     summary = "input-axis misalignment: a chip's sensing axes are turned against the body"
@@ -77,7 +93,21 @@ class Misalignment(Effect):
 
 
 class SensorPosition(Effect):
-    """A chip that is not where the drawing says."""
+    """A chip that is not where the drawing says.
+
+    The sensing element is displaced against the drawing: by the placement of the package, or within the package.
+
+    Notes
+    -----
+    :formula: y = f + a·(α·z×d + ω²·z×(z×d))
+    :symbols: d = {chip}_{axis}_m
+    :size: 1 mm, by choice: hand assembly. The place of the element in a package of 3 to 5 mm is seldom stated.
+    :example: a1_x_m = 0.002, a2_y_m = -0.0015
+    :experiment: Spin upright and with the array on its side. The displacement of an eccentric mounting changes with the
+        mounting, that of a chip goes with the chip. No spin about an axis shows a displacement along it.
+    :recordings: MIMU4444: up to 0.3 mm, about (0.3, 0.3, 0.1) mm in each chip's own axes, mirrored on the lower side of
+        the board: the element is not in the middle of its package. Two recordings agree within 0.1 mm.
+    """
 
     name = "sensor_position"
     summary = "a chip is not where the drawing says"
@@ -128,7 +158,19 @@ class _TwoAxes(Effect):
 
 
 class Eccentricity(_TwoAxes):
-    """The whole array off the table's axis."""
+    """The whole array off the table's axis.
+
+    The array is bolted to the table some millimetres off the axis, so that all chips are on other radii than drawn.
+
+    Notes
+    -----
+    :formula: y = f + a·(α·z×e + ω²·z×(z×e))
+    :symbols: e = {x,y}_m
+    :size: 1 mm, by choice: a hole pattern drilled by hand.
+    :example: x_m = 0.003, y_m = -0.002
+    :experiment: Remount the array, turned by 90° on its side, and spin again: the offset is new in the new mounting,
+        places of chips stay. In one mounting it is exactly a common displacement of all chips.
+    """
 
     name = "eccentricity"
     summary = "the whole array is off the table's axis"
@@ -145,7 +187,20 @@ class Eccentricity(_TwoAxes):
 
 
 class MountTilt(_TwoAxes):
-    """The array not square to the table's axis."""
+    """The array not square to the table's axis.
+
+    The array stands askew on the table: a chip under a corner of the foot, a bracket that is not square. It turns about
+    the cube's centre; F is the specific force at the chip, ρ its place from the centre.
+
+    Notes
+    -----
+    :formula: y = f + (n×a)·F + a·(α·z×(n×ρ) + ω²·z×(z×(n×ρ)))
+    :symbols: n = {x,y}_rad
+    :size: 0.5°, by choice: 0.9 mm under one edge of a 100 mm cube.
+    :example: x_rad = 0.01, y_rad = -0.006
+    :experiment: Remount the array on its side: a tilted mounting is new then, misaligned chips stay as they are. At
+        rest alone it is the same as an axis out of level, until the table is turned by half a turn.
+    """
 
     name = "mount_tilt"
     summary = "the array is not square to the table's axis"
@@ -160,7 +215,20 @@ class MountTilt(_TwoAxes):
 
 
 class MountTurn(Effect):
-    """The array turned against a linear axis."""
+    """The array turned against a linear axis.
+
+    The array on a carriage, such as an accelerometer on a printer's toolhead, is turned against the axis that carries
+    it. F is the specific force.
+
+    Notes
+    -----
+    :formula: y = f + (n×a)·F
+    :symbols: n = {x,y,z}_rad
+    :size: 1°, by choice: a board that is clipped or taped to the toolhead.
+    :example: x_rad = 0.006, y_rad = 0.01, z_rad = -0.008
+    :experiment: Move the carriage with strong accelerations both ways: a turned array shows a share of them across the
+        axis. Then remount it on its side: the turn of the mounting is new, a pick-up between channels stays.
+    """
 
     name = "mount_turn"
     summary = "the array is turned against the axis that carries it"
@@ -188,7 +256,20 @@ class MountTurn(Effect):
 
 
 class TableTilt(_TwoAxes):
-    """The table's axis not vertical: gravity turns once per revolution in x and y."""
+    """The table's axis not vertical: gravity turns once per revolution in x and y.
+
+    The table stands on a bench that is not level, so that its axis leans by n and gravity goes round in the turning
+    array.
+
+    Notes
+    -----
+    :formula: y = f − g·a·turn(n×z, −θ)
+    :symbols: n = {x,y}_rad
+    :size: 0.3°, by choice: 5 mm per metre, a bench that nobody levelled.
+    :example: x_rad = 0.004, y_rad = -0.002
+    :experiment: Turn slowly through several whole turns. The residual of the channels across the axis is a sine of the
+        table's angle whose amplitude g |n| does not depend on the rate.
+    """
 
     name = "table_tilt"
     summary = "the table's axis is not vertical: gravity turns once per revolution in x and y"
@@ -204,14 +285,43 @@ class TableTilt(_TwoAxes):
 
 
 class RailTilt(TableTilt):
-    """A linear axis that is not where the twin has it: gravity has other parts along the array's axes."""
+    """A linear axis that is not where the twin has it: gravity has other parts along the array's axes.
+
+    The carriage's axis is out of level, so that gravity has another part along each sensing axis, the same all the
+    time.
+
+    Notes
+    -----
+    :formula: y = f − g·a·(n×z)
+    :symbols: n = {x,y}_rad
+    :size: 0.3°, by choice.
+    :example: x_rad = 0.004, y_rad = -0.002
+    :experiment: Remount the array on its side: an offset of a channel stays with the channel, a part of gravity goes to
+        other channels.
+    """
 
     summary = "the linear axis is out of level: gravity has other parts along the sensing axes, the same all the time"
     separated_by = "the array remounted on its side: an offset of a channel stays, a part of gravity changes channels"
 
 
 class AxisWobble(Effect):
-    """The axis nods once per revolution (bearing runout)."""
+    """The axis nods once per revolution (bearing runout).
+
+    The axis itself nods about a horizontal line once per revolution, as with runout of a bearing or a bent shaft; e is
+    that line in the room. The rate and the acceleration then have parts across the axis.
+
+    Notes
+    -----
+    :formula: n = A·cos(θ + φ)·turn(x, ψ);
+        w = turn(ṅ + ω·z, −θ);
+        b = turn(n̈ + α·z + ω·ṅ×z, −θ);
+        y = a·(g·turn(z − n×z, −θ) + b×r + w×(w×r))
+    :symbols: A = amplitude_rad; φ = phase_rad; ψ = direction_rad
+    :size: 0.1°, by choice: 0.2 mm of runout on a radius of 100 mm.
+    :example: amplitude_rad = 0.002, phase_rad = 0.5, direction_rad = 0.0
+    :experiment: Spin at two or more speeds. The part of gravity keeps its size, the rest grows with ω² and has lines at
+        one and two cycles per revolution; an axis that only leans has a single line of constant size.
+    """
 
     name = "axis_wobble"
     summary = "the axis nods once per revolution (bearing runout)"
@@ -254,7 +364,20 @@ class AxisWobble(Effect):
 
 
 class Gravity(Effect):
-    """Local gravity other than assumed."""
+    """Local gravity other than assumed.
+
+    The twin has standard gravity, the lab another one; u is up, in the table's frame.
+
+    Notes
+    -----
+    :formula: y = f + Δ·a·u
+    :symbols: Δ = delta_m_s2
+    :size: 0.015 m/s². Gravity at sea level goes from 9.780 m/s² at the equator to 9.832 m/s² at the poles (WGS 84),
+        standard gravity is 9.80665 m/s².
+    :example: delta_m_s2 = 0.01
+    :experiment: Look it up: the latitude and height of the lab give it to 0.001 m/s². From data alone, tilt the array
+        so that other channels see gravity: a gain that all channels share stays confounded with it for a unit at rest.
+    """
 
     name = "gravity"
     summary = "local gravity is other than assumed"
@@ -274,8 +397,21 @@ class Gravity(Effect):
 class CentrifugalFlex(Effect):
     """Arms that stretch with ω² across the axis, where the load is: each is as long as the present rate makes it.
 
+    The arms that carry the chips give way to their centrifugal load and grow by the share kω². With μ = 1
+    (``moving_arms``) the growth is a motion of its own.
+
     With ``moving_arms`` = 1 it also moves while it grows, as a soft rig does, which adds Coriolis and radial
     acceleration; without, the arm of the moment turns as if rigid.
+
+    Notes
+    -----
+    :formula: s = k·ω²;
+        y = f + s·a·(α·z×r + ω²·z×(z×r)) + μ·a·(2·ω·ṡ·z×r − s̈·z×(z×r))
+    :symbols: k = stretch_s2_rad2; μ = moving_arms
+    :size: 2.5e-5 s²/rad², by choice: 0.6 % at 15 rad/s, a printed plastic frame.
+    :example: stretch_s2_rad2 = 5e-5, moving_arms = 1
+    :experiment: Spin at several high speeds, upright and with the array on its side: the stretch is of what lies across
+        the axis in that mounting, a non-linearity is of the channel. Stiffen the frame and see it go.
     """
 
     name = "centrifugal_flex"
@@ -310,7 +446,21 @@ _CHANCE = 0.2
 
 
 class Cogging(Effect):
-    """Torque ripple locked to the table's angle."""
+    """Torque ripple locked to the table's angle.
+
+    The motor's torque has n cycles per revolution (poles, slots, gear teeth), which the speed loop takes back only in
+    part. δ is the error of the angle against the command; the servo is taken to have ω₀ = 2π rad/s and ζ = 0.7, and
+    friction to hold the table below ω₁ = 0.3 rad/s.
+
+    Notes
+    -----
+    :formula: δ̈ = A·ω²/(ω² + ω₁²)·sin(n·(θ + δ) + φ) − 2·ζ·ω₀·δ̇ − ω₀²·δ
+    :symbols: A = amplitude_rad_s2; n = order; φ = phase_rad
+    :size: 1 rad/s², by choice: 1 mN m on 10⁻³ kg m².
+    :example: amplitude_rad_s2 = 1.0, order = 6, phase_rad = 0.3
+    :experiment: Turn slowly and steadily at two speeds. The tangential channels and the reference both show lines at n
+        cycles per revolution; a ripple of the reference alone leaves the channels at rest.
+    """
 
     name = "cogging"
     summary = "torque ripple locked to the table's angle (n cycles per revolution)"
@@ -363,7 +513,22 @@ class Cogging(Effect):
 
 
 class Resonance(Effect):
-    """A mode of the mounting: torsion on a table, belt and frame of a linear axis; excited by its acceleration."""
+    """A mode of the mounting: torsion on a table, belt and frame of a linear axis; excited by its acceleration.
+
+    Array and foot are an inertia on a torsional spring, which the table's angular acceleration α excites; κ is the
+    share of the twist that the array takes part in. On a linear axis belt and frame are the spring.
+
+    Notes
+    -----
+    :formula: φ̈ + 2·ζ·ω₀·φ̇ + ω₀²·φ = −α;
+        θ′ = θ + κ·φ
+    :symbols: κ = gain; ω₀ = 2π·frequency_hz; ζ = damping_ratio
+    :size: 0.3 of the inertia, by choice; 1 is all of it behind one spring. Damping ratios of bolted metal are 0.01 to
+        0.05.
+    :example: gain = 0.4, frequency_hz = 9.0, damping_ratio = 0.04
+    :experiment: Stop quickly and rest: the mode decays alone, at its own frequency, in the tangential channels. A lag
+        of the sensing chain has no oscillation after the stop.
+    """
 
     name = "resonance"
     summary = "a mode between the drive and the array, excited by acceleration"

@@ -26,7 +26,19 @@ _GRID = 2e-3  # s, on which a mode is simulated
 
 
 class TachoLag(Effect):
-    """A tachometer that is filtered: a first-order lag of its own."""
+    """A tachometer that is filtered: a first-order lag of its own.
+
+    The reference passes through a low pass: the smoothing of a tachogenerator or a moving average of a counter.
+
+    Notes
+    -----
+    :formula: τ·Ω̇′ + Ω′ = Ω
+    :symbols: τ = time_constant_s
+    :size: 10 ms, by choice.
+    :example: time_constant_s = 0.015
+    :experiment: Rock the table with a chirp up to 1/(2πτ): the reference loses amplitude against the channels, which a
+        delay does not do.
+    """
 
     name = "tacho_lag"
     summary = "the reference has a first-order low pass of its own"
@@ -50,7 +62,18 @@ class TachoLag(Effect):
 
 
 class ChipLag(Effect):
-    """Chips with a limited bandwidth, each of its own."""
+    """Chips with a limited bandwidth, each of its own.
+
+    One chip is set to another output data rate than the others, so that its own low pass is slower.
+
+    Notes
+    -----
+    :formula: τ·ẏ + y = f
+    :symbols: τ = {chip}_s
+    :size: 5 ms: half an output data rate of 64 Hz.
+    :example: a2_s = 0.008
+    :experiment: Read back the rate register of each chip. From data: a chirp, in which one chip alone loses amplitude.
+    """
 
     name = "chip_lag"
     summary = "chips have first-order lags of their own (another output data rate)"
@@ -89,7 +112,20 @@ class ChipLag(Effect):
 
 
 class BearingShake(Effect):
-    """The table shakes up and down so many times per revolution, as balls of a bearing or gear teeth make it."""
+    """The table shakes up and down so many times per revolution, as balls of a bearing or gear teeth make it.
+
+    Balls that pass a flaw of a bearing, or the teeth of a gear, lift table and array; the acceleration grows with the
+    rate.
+
+    Notes
+    -----
+    :formula: y = f + A·abs(ω)·sin(n·θ + φ)·a·z
+    :symbols: A = amplitude_m_s2_per_rad_s; n = order; φ = phase_rad
+    :size: 5 mm/s² per rad/s, by choice.
+    :example: amplitude_m_s2_per_rad_s = 0.02, order = 7.3, phase_rad = 0.0
+    :experiment: Turn steadily, slow and fast. The line in the vertical channels follows the rate at the same number of
+        cycles per revolution, whole or not; an interference keeps its frequency.
+    """
 
     name = "bearing_shake"
     summary = "the table shakes up and down so many times per revolution, in proportion to the rate"
@@ -177,7 +213,22 @@ def _along_angle(
 
 
 class BenchSway(Effect):
-    """The bench sways at a mode of its own, driven by an unbalance that turns with the table."""
+    """The bench sways at a mode of its own, driven by an unbalance that turns with the table.
+
+    A mass off the axis turns with the table and drives the bench, which sways at a mode of its own; c and s are its
+    answers to the two parts of the rotating force, p and q the sizes along the room's x and y.
+
+    Notes
+    -----
+    :formula: c̈ + 2·ζ·ω₀·ċ + ω₀²·c = ω²·cos(θ) + α·sin(θ);
+        s̈ + 2·ζ·ω₀·ṡ + ω₀²·s = ω²·sin(θ) − α·cos(θ);
+        y = f + a·turn(c̈·p + s̈·q, −θ)
+    :symbols: ω₀ = 2π·frequency_hz; ζ = damping_ratio; p = {x,y}_cosine_m; q = {x,y}_sine_m
+    :size: 1 mm far above the mode, by choice: 100 g at 100 mm on a bench of 10 kg.
+    :example: x_cosine_m = 0.001, y_sine_m = 0.001, frequency_hz = 1.5, damping_ratio = 0.05
+    :experiment: Go slowly through the speed at which the bench sways most. Balance the table, or hold the bench: the
+        sway goes with it.
+    """
 
     name = "bench_sway"
     summary = "the bench sways at a mode of its own under a rotating unbalance"

@@ -66,7 +66,24 @@ class _PerChannel(Effect):
 
 
 class Bias(_PerChannel):
-    """Constant offset per channel."""
+    """Constant offset per channel.
+
+    Each channel reads the same amount too much whatever the unit does: a chip from the reel, one under stress after
+    soldering, or one read at another temperature than it was calibrated at.
+
+    Notes
+    -----
+    :formula: y = f + b
+    :symbols: b = {channel}_m_s2
+    :size: Data sheet of the ADXL345 (Rev. E): 35 mg (x, y) and 40 mg (z) typical, 150 and 250 mg at most. The prior of
+        20 mg is smaller by choice: it is that of a unit that was trimmed once.
+    :example: a11_m_s2 = 0.2, a22_m_s2 = -0.15, a33_m_s2 = 0.1
+    :experiment: Put the unit at rest on six faces. Gravity changes its sign on a channel that is turned over, a bias
+        keeps it. On the table, record the same profile a second time with the array on its side.
+    :recordings: MIMU4444 (eight MPU-9150): up to 64 mg on z of one chip, the same within 1 mg in a second recording;
+        between the two, offsets moved by 4 to 24 mm/s². Xsens MTi (IMU-TK's recording): 0.9, −0.8 and 4.4 counts, or
+        2, −2 and 11 mm/s², from the factory's figures.
+    """
 
     name = "bias"
     summary = "a bias: a constant offset per channel"
@@ -85,7 +102,24 @@ class Bias(_PerChannel):
 
 
 class ScaleFactor(_PerChannel):
-    """Gain error per channel."""
+    """Gain error per channel.
+
+    Each channel reads a constant percentage too much: another supply voltage than the data sheet's, another range trim,
+    a wrong count size in the file.
+
+    Notes
+    -----
+    :formula: y = f·(1 + s)
+    :symbols: s = {channel}
+    :size: Data sheet of the ADXL345: 230 to 282 LSB/g about 256, that is ±10 % at most; 265 in place of 256 on x and y
+        at 3.3 V (+3.5 %). MPU-9150: ±3 %. The prior of 2 % is that of chips of one lot, by choice.
+    :example: a11 = 0.03, a22 = -0.02, a33 = 0.01
+    :experiment: Put the unit at rest on six faces: the difference of a channel between up and down is twice its gain
+        times gravity. For channels that see no gravity on the table, spin at several speeds with the array on its side
+        as well.
+    :recordings: MIMU4444: −0.5 to +0.8 % against the nominal 2048 LSB/g. Xsens MTi (IMU-TK's recording): 414.4, 412.0
+        and 414.6 counts per m/s² where the factory states 415, 413 and 415, that is −0.1 to −0.2 %.
+    """
 
     name = "scale_factor"
     summary = "a scale-factor error per channel (another supply voltage, say)"
@@ -108,7 +142,21 @@ class ScaleFactor(_PerChannel):
 
 
 class Quadratic(_PerChannel):
-    """Second-order non-linearity per channel."""
+    """Second-order non-linearity per channel.
+
+    The reading bends with its size, the same way for both signs: a sensing element whose spring or electrostatic
+    feedback is not symmetric.
+
+    Notes
+    -----
+    :formula: y = f + k·f²
+    :symbols: k = {channel}_s2_m
+    :size: 3 mg at 1 g. The ADXL345's data sheet allows ±0.5 % of full scale for all curvature together: at ±16 g that
+        is 80 mg at 16 g, or 0.3 mg at 1 g for a pure square; so the prior is wide, by choice.
+    :example: a11_s2_m = 0.0005, a22_s2_m = -0.0003
+    :experiment: Spin at several speeds in the centrifuge's range (tens of m/s²), so that the square of a reading and
+        the reading itself differ; the array on its side as well, so that the channels along gravity take part.
+    """
 
     name = "quadratic"
     summary = "a second-order non-linearity per channel"
@@ -125,7 +173,21 @@ class Quadratic(_PerChannel):
 
 
 class BiasTemperature(_PerChannel):
-    """Offsets that follow the board's temperature."""
+    """Offsets that follow the board's temperature.
+
+    The offset of each channel is proportional to the board's temperature above 25 °C. It needs a temperature in the
+    recording.
+
+    Notes
+    -----
+    :formula: y = f + k·(T − 25)
+    :symbols: k = {channel}_m_s2_K
+    :size: Data sheet of the ADXL345: ±0.4 mg/K (x, y) and ±1.2 mg/K (z) typical; the prior is 0.8 mg/K for all.
+    :example: a11_m_s2_K = 0.01, a22_m_s2_K = -0.008
+    :experiment: Warm the resting unit by 10 K with a hair dryer or in an oven and let it cool: offsets that follow the
+        temperature come back with it, a settling after turn-on does not.
+    :recordings: Recordings at hand have no temperature that changes enough to measure it.
+    """
 
     name = "bias_temperature"
     summary = "biases follow the board's temperature"
@@ -146,7 +208,23 @@ class BiasTemperature(_PerChannel):
 
 
 class WarmUp(_PerChannel):
-    """Offsets that settle exponentially after power-on."""
+    """Offsets that settle exponentially after power-on.
+
+    Offsets start where the cold unit has them, which the calibration knows, and approach another value as the chip
+    warms itself.
+
+    Notes
+    -----
+    :formula: y = f + b·(1 − exp(−t/τ))
+    :symbols: b = {channel}_m_s2; τ = time_constant_s
+    :size: 10 mg, by choice: some kelvins of self-heating times 1 mg/K. The time constant is that of the board, seconds
+        to minutes.
+    :example: a11_m_s2 = 0.1, a23_m_s2 = -0.08, time_constant_s = 15.0
+    :experiment: Switch on the cold unit and record ten minutes at rest; then record again without switching off. Only
+        the first recording settles.
+    :recordings: MIMU4444: z offsets settle by some 0.06 m/s² with a slow time constant, the same sign in both
+        recordings; z of chip 4 moved by more than 30 mm/s² in its first minute.
+    """
 
     name = "warm_up"
     summary = "biases settle exponentially after turn-on (warm-up)"
@@ -174,7 +252,20 @@ class WarmUp(_PerChannel):
 
 
 class ColdStart(WarmUp):
-    """Offsets that decay from power-on: a unit that was calibrated warm and starts cold."""
+    """Offsets that decay from power-on: a unit that was calibrated warm and starts cold.
+
+    The unit was calibrated warm. Switched on cold, its offsets are off at first and come back to the calibrated values.
+
+    Notes
+    -----
+    :formula: y = f + b·exp(−t/τ)
+    :symbols: b = {channel}_m_s2; τ = time_constant_s
+    :size: 10 mg, as of `warm_up`. It is taken to be 30 times rarer than that, by choice.
+    :example: a11_m_s2 = 0.1, a23_m_s2 = -0.08, time_constant_s = 10.0
+    :experiment: Record a rest directly after the calibration, without switching off: the offsets are zero then. Record
+        another one after a cold start: they decay to zero. A constant bias shows in both.
+    :recordings: No real recording at hand was found to have it; the settling of the MIMU4444 is listed at `warm_up`.
+    """
 
     name = "cold_start"
     summary = "biases decay exponentially after turn-on (calibrated warm, started cold)"
@@ -195,7 +286,22 @@ class ColdStart(WarmUp):
 
 
 class VibrationRectification(_PerChannel):
-    """Mean readings that shift with vibration, as ω⁴."""
+    """Mean readings that shift with vibration, as ω⁴.
+
+    Vibration of motor and bearing is rectified by the curvature of the sensing element into a shift of the mean
+    reading. The vibration of a rotating unbalance grows as ω², the square of it as ω⁴.
+
+    Notes
+    -----
+    :formula: y = f + k·ω⁴
+    :symbols: k = {channel}_m_s2_per_rad4_s4
+    :size: 30 mg at 15 rad/s, by choice. Data sheets of tactical-grade parts state a rectification coefficient per g²
+        rms, that of the ADXL345 none.
+    :example: a11_m_s2_per_rad4_s4 = 5e-6, a22_m_s2_per_rad4_s4 = -3e-6
+    :experiment: Repeat a run at several speeds with the array on a foam pad or another isolator: rectification falls
+        with the vibration, a gain, a curvature or a stretching arm does not. Or shake the resting unit and look at the
+        mean.
+    """
 
     name = "vibration_rectification"
     summary = "mean readings shift with vibration, about as ω⁴"
@@ -222,7 +328,23 @@ class VibrationRectification(_PerChannel):
 
 
 class CrossAxis(Effect):
-    """A channel that picks up its neighbour on the same chip."""
+    """A channel that picks up its neighbour on the same chip.
+
+    A channel also reads a share of another axis of its chip: a sensing element that is not square to its neighbour, or
+    electrical crosstalk within the package.
+
+    Notes
+    -----
+    :formula: y[i] = f[i] + c·f[j]
+    :symbols: c = {pair}
+    :size: Data sheets: ±1 % (ADXL345), ±2 % (MPU-9150). The prior is 1 %.
+    :example: a11_from_a12 = 0.01, a22_from_a23 = -0.008
+    :experiment: Six or more poses at rest give every pair of axes. A chip that is turned as a whole has pick-up of
+        opposite sign in the two directions of a pair; a pick-up that is alike in both directions is no turn. A pure
+        turn of a chip is better called misalignment.
+    :recordings: MIMU4444: up to 0.7 % from channel to channel, the same in both recordings. Xsens MTi (IMU-TK's
+        recording): axes 0.3, 0.9 and 2.1 % off square.
+    """
 
     name = "cross_axis"
     summary = "cross-axis sensitivity: a channel picks up its neighbour on the same chip"
@@ -285,7 +407,21 @@ class CrossAxis(Effect):
 
 
 class SensorLag(Effect):
-    """Limited bandwidth of the sensing chain: a first-order lag."""
+    """Limited bandwidth of the sensing chain: a first-order lag.
+
+    All channels pass through the same low pass before they are sampled: the chip's filter at its output data rate, or
+    an RC filter on the board.
+
+    Notes
+    -----
+    :formula: τ·ẏ + y = f
+    :symbols: τ = time_constant_s
+    :size: 5 ms: the ADXL345 has a bandwidth of half its output data rate, 50 Hz at 100 Hz, and 1/(2π · 50 Hz) is 3.2
+        ms.
+    :example: time_constant_s = 0.008
+    :experiment: Rock the table with a chirp up to the highest frequency it follows. A lag lowers the amplitude and
+        turns the phase as the arctangent, a delay turns the phase alone and in proportion to the frequency.
+    """
 
     name = "sensor_lag"
     summary = "limited bandwidth of the sensing chain"
@@ -306,8 +442,19 @@ class SensorLag(Effect):
 class ProofMass(Effect):
     """A sensing chain of second order: the chip's mass on its spring, with its damper (GF-IMU paper, eq. 2).
 
+    The sensing element is a mass on a spring with a damper. It resonates, if it is excited near its own frequency.
+
     Far below the resonance it is `SensorLag` with the time constant damping_ratio / (π resonance_hz). So it is a part
     of simulations only: a diagnosis names the lag.
+
+    Notes
+    -----
+    :formula: ÿ/ω₀² + 2·ζ/ω₀·ẏ + y = f
+    :symbols: ω₀ = 2π·resonance_hz; ζ = damping_ratio
+    :size: 1 kHz; surface micromachined elements have kilohertz. A damping ratio of 0.7 is the default.
+    :example: resonance_hz = 60.0, damping_ratio = 0.3
+    :experiment: Tap the resting unit and sample at more than twice the resonance: the reading oscillates at it. Far
+        below the resonance only the lag 2ζ/ω₀ is seen.
     """
 
     name = "proof_mass"
@@ -343,7 +490,21 @@ def _play(readings: NDArray[np.float64], width: float) -> NDArray[np.float64]:
 
 
 class Hysteresis(Effect):
-    """Play in the reading: it follows the specific force only after the play is taken up."""
+    """Backlash in the reading: it follows the specific force only after the backlash is taken up.
+
+    A share of each reading depends on the direction from which it came: a flexing package, a creeping solder joint,
+    friction in a mount.
+
+    Notes
+    -----
+    :formula: y = f + (h/w)·(backlash(f, w) − f)
+    :symbols: h = lost_m_s2; w = width_m_s2
+    :size: 5 mg lost, by choice; the half-width from 2 to 600 mg is searched on a grid.
+    :example: lost_m_s2 = 0.1, width_m_s2 = 0.1
+    :experiment: Reverse the rate slowly many times and plot the residual against the reading: a loop that is run
+        through in one sense. A non-linearity is one line there, and a lag a loop that widens with the speed of the
+        reversal.
+    """
 
     name = "hysteresis"
     summary = "hysteresis: a reading depends on the direction from which it came"
@@ -384,7 +545,19 @@ class Hysteresis(Effect):
 
 
 class GainDrift(Effect):
-    """All gains drift with time."""
+    """All gains drift with time.
+
+    The gain of all channels changes in proportion to time: a supply or a reference voltage that drifts during the run.
+
+    Notes
+    -----
+    :formula: y = f·(1 + k·t)
+    :symbols: k = slope_1_s
+    :size: 2e-4 per second, or 1.2 % in a minute, by choice: a battery under load.
+    :example: slope_1_s = 0.0002
+    :experiment: Repeat the same speeds early and late in a run of some minutes. An offset that drifts adds the same at
+        every speed, a gain adds in proportion to the reading.
+    """
 
     name = "gain_drift"
     summary = "all gains drift with time"
@@ -405,7 +578,22 @@ class GainDrift(Effect):
 
 
 class InterferenceTone(Effect):
-    """A tone at a fixed frequency on all channels."""
+    """A tone at a fixed frequency on all channels.
+
+    The same sine is added to all channels: mains on a supply or ground line, a fan or pump, possibly aliased to a low
+    frequency by the sampling.
+
+    Notes
+    -----
+    :formula: y = f + A·sin(2·π·ν·t + φ)
+    :symbols: A = amplitude_m_s2; ν = frequency_hz; φ = phase_rad
+    :size: 2 mg, by choice.
+    :example: amplitude_m_s2 = 0.03, frequency_hz = 21.3, phase_rad = 0.0
+    :experiment: Record at rest: the line is all there is besides noise. Record at another sample rate: an aliased line
+        moves, a true one stays.
+    :recordings: None on all channels. One channel of the MIMU4444 (m41) has a tone of 0.14 m/s² that varies between 8
+        and 9.4 Hz; its frequency is not fixed and it is on one channel, so that this effect does not describe it.
+    """
 
     name = "interference_tone"
     summary = "a tone at a fixed frequency (mains, aliased or not) on all channels"

@@ -18,7 +18,20 @@ __all__ = ["ChannelSkew", "ClockError", "TachoLatency", "TachoRipple", "TachoSca
 
 
 class ChannelSkew(Effect):
-    """Chips sampled one after another, not together."""
+    """Chips sampled one after another, not together.
+
+    The host reads the chips one after another over one bus, so that chip i is late by (i − 1)δ, while all readings of a
+    row carry one time.
+
+    Notes
+    -----
+    :formula: y = f(t + (i − 1)·δ)
+    :symbols: δ = per_chip_s
+    :size: 1 ms, by choice. Reading six bytes of a chip over I²C at 400 kHz takes 0.2 ms, at 100 kHz 0.8 ms.
+    :example: per_chip_s = 0.002
+    :experiment: Rock the table fast. The residual of each chip is its delay times the rate of change of the reading.
+        Read the chips in the opposite order: a skew changes its sign, delays of the chips' own do not.
+    """
 
     name = "channel_skew"
     summary = "chips are sampled one after another, not together"
@@ -39,7 +52,21 @@ class ChannelSkew(Effect):
 
 
 class ClockError(Effect):
-    """The board's clock runs fast or slow against the reference's."""
+    """The board's clock runs fast or slow against the reference's.
+
+    Board and reference have oscillators of their own. The board's shows (1 + ε) of the true time, so that the two drift
+    apart from the start of the run.
+
+    Notes
+    -----
+    :formula: y = f(t/(1 + ε))
+    :symbols: ε = ratio
+    :size: 1e-3, by choice. A crystal is within 1e-4, an RC oscillator in a microcontroller or a sensor within some
+        percent.
+    :example: ratio = 0.001
+    :experiment: Make the same fast change of the rate at the beginning and at the end of a long run. A delay is the
+        same at both, a clock error grows with the time between them.
+    """
 
     name = "clock_error"
     summary = "the board's clock runs fast or slow against the reference's"
@@ -58,7 +85,20 @@ class ClockError(Effect):
 
 
 class TachoLatency(Effect):
-    """The reference is late."""
+    """The reference is late.
+
+    The reading of the tachometer arrives late: a filter or a gate time in its electronics, a queue of the host. Its
+    time stamp belongs to what was δ earlier.
+
+    Notes
+    -----
+    :formula: Ω′ = Ω(t − δ)
+    :symbols: δ = delay_s
+    :size: 10 ms, one sample period at 100 Hz, by choice.
+    :example: delay_s = 0.01
+    :experiment: Rock the table with a chirp. A delay turns the phase in proportion to the frequency and leaves the
+        amplitude; a lag of the tachometer lowers the amplitude as well.
+    """
 
     name = "tacho_latency"
     summary = "the reference is late"
@@ -77,7 +117,19 @@ class TachoLatency(Effect):
 
 
 class TachoScale(Effect):
-    """The reference has a wrong gain: it reads (1 + ratio)·ω."""
+    """The reference has a wrong gain: it reads (1 + ratio)·ω.
+
+    The tachometer's calibration, its number of marks or a gear ratio in between is wrong.
+
+    Notes
+    -----
+    :formula: Ω′ = (1 + s)·Ω
+    :symbols: s = ratio
+    :size: 1 %, by choice: a tachogenerator.
+    :example: ratio = 0.02
+    :experiment: Count whole turns against a mark on the table for a minute. From the recording alone: fast ramps, as a
+        wrong gain scales the centripetal part by 2s and the tangential one by s.
+    """
 
     name = "tacho_scale"
     summary = "the reference has a wrong gain"
@@ -96,7 +148,18 @@ class TachoScale(Effect):
 
 
 class AngleZero(Effect):
-    """The encoder's zero is not where the twin has it: gravity shows that where the axis leans."""
+    """The encoder's zero is not where the twin has it: gravity shows that where the axis leans.
+
+    The encoder's index is not at the angle where the twin has its zero: a coupling that was tightened in another place.
+
+    Notes
+    -----
+    :formula: θ′ = θ + Δ
+    :symbols: Δ = offset_rad
+    :size: 0.02 rad, by choice.
+    :example: offset_rad = 0.02
+    :experiment: Let the pendulum hang at rest and read the encoder; repeat at several angles.
+    """
 
     name = "angle_zero"
     summary = "the encoder's zero is off the direction of gravity"
@@ -115,7 +178,20 @@ class AngleZero(Effect):
 
 
 class TachoRipple(Effect):
-    """The reference is modulated once or n times per revolution."""
+    """The reference is modulated once or n times per revolution.
+
+    The reading of the reference is modulated with the table's angle, while the table turns evenly: an encoder disc that
+    is off centre, poles of a tachogenerator.
+
+    Notes
+    -----
+    :formula: Ω′ = Ω·(1 + A·sin(n·θ + φ))
+    :symbols: A = amplitude; n = order; φ = phase_rad
+    :size: 1 %, by choice: a disc of 10 mm radius that is 0.1 mm off centre.
+    :example: amplitude = 0.02, order = 1, phase_rad = 0.4
+    :experiment: Turn slowly and steadily. The lines in the reference have none beside them in the tangential channels,
+        which a table that really turns unevenly would show.
+    """
 
     name = "tacho_ripple"
     summary = "the reference itself is modulated once or n times per revolution"

@@ -26,7 +26,20 @@ _UNITS = {"rate_unit_rad_s": "rad/s", "acceleration_unit_rad_s2": "rad/s²", "du
 
 
 class Unknown(Effect):
-    """A term that describes without a name: ``dependence`` times a coefficient per channel and of the reference."""
+    """A term that describes without a name: ``dependence`` times a coefficient per channel and of the reference.
+
+    Something real that nothing in the library explains, kept as data: h is a function of rate, acceleration, angle or
+    time.
+
+    Notes
+    -----
+    :formula: y = f + c·h
+    :symbols: c = {channel}_m_s2
+    :size: 0.1 m/s² per channel and 0.1 rad/s of the reference where the function is 1, by choice.
+    :example: dependence = 'rate', rate_unit_rad_s = 10.0, a11_m_s2 = 0.1, a22_m_s2 = -0.05
+    :experiment: Record another run with another motion. What stays the same function of the motion is in the rig or the
+        sensors; what does not is an event.
+    """
 
     name = "unknown"
     summary = "a dependence that the data show and nothing in the library explains"

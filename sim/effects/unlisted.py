@@ -110,7 +110,18 @@ class _OfReference(Unlisted):
 
 
 class ReferenceOffset(_OfReference):
-    """A reference with a constant offset."""
+    """A reference with a constant offset.
+
+    The tachometer reads a constant amount at rest: an amplifier that was not zeroed, the bias of a gyro.
+
+    Notes
+    -----
+    :formula: Ω′ = Ω + e
+    :symbols: e = error_rad_s
+    :size: 0.1 rad/s, by choice.
+    :example: error_rad_s = 0.05
+    :experiment: Hold the table still and read the reference.
+    """
 
     name = "reference_offset"
     summary = "the reference is off by a constant"
@@ -118,7 +129,19 @@ class ReferenceOffset(_OfReference):
 
 
 class ReferenceSpeed(_OfReference):
-    """A reference that reads unlike in both directions."""
+    """A reference that reads unlike in both directions.
+
+    The gain of the reference is larger in one direction than in the other: brushes of a tachogenerator, a rectifying
+    stage.
+
+    Notes
+    -----
+    :formula: Ω′ = Ω + e·abs(ω)
+    :symbols: e = error_rad_s_per_rad_s
+    :size: 0.1 rad/s at 10 rad/s, by choice.
+    :example: error_rad_s_per_rad_s = 0.01
+    :experiment: Repeat the same speeds in both directions against counted turns.
+    """
 
     name = "reference_by_direction"
     summary = "the reference has another gain in one direction than in the other"
@@ -126,7 +149,20 @@ class ReferenceSpeed(_OfReference):
 
 
 class ReferenceSquare(_OfReference):
-    """A reference whose gain grows with the rate."""
+    """A reference whose gain grows with the rate.
+
+    The gain of the reference changes in proportion to the rate, alike in both directions: a tachogenerator under the
+    load of its own current.
+
+    Notes
+    -----
+    :formula: Ω′ = Ω + e·ω·abs(ω)
+    :symbols: e = error_rad_s_per_rad2_s2
+    :size: 0.1 rad/s at 10 rad/s, by choice.
+    :example: error_rad_s_per_rad2_s2 = 0.001
+    :experiment: A second reference, such as a gyro on the table or a stopwatch over counted turns, shows it at once.
+        With one: runs at several speeds in both directions, as the channels know ω² without it.
+    """
 
     name = "reference_rate_squared"
     summary = "the gain of the reference changes in proportion to the rate"
@@ -134,7 +170,20 @@ class ReferenceSquare(_OfReference):
 
 
 class ReferenceEven(_OfReference):
-    """A reference whose error has one sign in both directions and grows with the rate squared."""
+    """A reference whose error has one sign in both directions and grows with the rate squared.
+
+    The reference is off by the same amount in both directions, in proportion to ω²: a gyro that is sensitive to the
+    centripetal acceleration.
+
+    Notes
+    -----
+    :formula: Ω′ = Ω + e·ω²
+    :symbols: e = error_rad_s_per_rad2_s2
+    :size: 0.1 rad/s at 10 rad/s, by choice.
+    :example: error_rad_s_per_rad2_s2 = 0.001
+    :experiment: Repeat the same speeds in both directions: the error of a gain changes its sign with the direction,
+        this one does not. A gyro is also moved onto the axis.
+    """
 
     name = "reference_error_by_rate_squared"
     summary = "the reference is off in proportion to the rate squared, the same way in both directions"
@@ -142,7 +191,19 @@ class ReferenceEven(_OfReference):
 
 
 class ReferenceCube(_OfReference):
-    """A reference whose gain grows with the rate squared."""
+    """A reference whose gain grows with the rate squared.
+
+    The gain of the reference changes with ω²: saturation of a tachogenerator or of a gyro near its range.
+
+    Notes
+    -----
+    :formula: Ω′ = Ω + e·ω³
+    :symbols: e = error_rad_s_per_rad3_s3
+    :size: 0.1 rad/s at 10 rad/s, by choice.
+    :example: error_rad_s_per_rad3_s3 = 0.0001
+    :experiment: A second reference, such as a gyro on the table or a stopwatch over counted turns, shows it at once.
+        With one: runs at several speeds in both directions, as the channels know ω² without it.
+    """
 
     name = "reference_rate_cubed"
     summary = "the gain of the reference changes with the rate squared"
@@ -170,7 +231,20 @@ class _OfCube(Unlisted):
 
 
 class LeanByRateSquared(_OfCube):
-    """An array that centrifugal force leans."""
+    """An array that centrifugal force leans.
+
+    The foot of the array gives way to the centrifugal force, so that it leans by n about its foot in proportion to ω².
+    F is the specific force at the chip, r its place from the foot.
+
+    Notes
+    -----
+    :formula: n = ω²·ν;
+        y = f + (n×a)·F + a·(n̈×r + 2·ω·z×(ṅ×r) + α·z×(n×r) + ω²·z×(z×(n×r)))
+    :symbols: ν = {x,y}_rad_per_rad2_s2
+    :size: 4 mrad at 10 rad/s, by choice.
+    :example: x_rad_per_rad2_s2 = 4e-5, y_rad_per_rad2_s2 = -2e-5
+    :experiment: Spin at several speeds, then clamp the foot or brace the top of the array: the lean goes.
+    """
 
     name = "lean_by_rate_squared"
     summary = "the array leans with the square of the rate"
@@ -178,7 +252,20 @@ class LeanByRateSquared(_OfCube):
 
 
 class LeanByRate(_OfCube):
-    """An array that leans one way or the other with the rate."""
+    """An array that leans one way or the other with the rate.
+
+    The array leans by n in proportion to the rate, the other way in the other direction: air drag on a sail-like cover,
+    a gyroscopic couple of a part that spins.
+
+    Notes
+    -----
+    :formula: n = ω·ν;
+        y = f + (n×a)·F + a·(n̈×r + 2·ω·z×(ṅ×r) + α·z×(n×r) + ω²·z×(z×(n×r)))
+    :symbols: ν = {x,y}_rad_per_rad_s
+    :size: 4 mrad at 10 rad/s, by choice.
+    :example: x_rad_per_rad_s = 4e-4, y_rad_per_rad_s = -2e-4
+    :experiment: Repeat the same speeds in both directions: the lean changes its side.
+    """
 
     name = "lean_by_rate"
     summary = "the array leans with the rate"
@@ -186,7 +273,20 @@ class LeanByRate(_OfCube):
 
 
 class LeanByAcceleration(_OfCube):
-    """An array that leans when the table accelerates."""
+    """An array that leans when the table accelerates.
+
+    A tall array on a soft foot leans back while the table accelerates.
+
+    Notes
+    -----
+    :formula: n = α·ν;
+        y = f + (n×a)·F + a·(n̈×r + 2·ω·z×(ṅ×r) + α·z×(n×r) + ω²·z×(z×(n×r)))
+    :symbols: ν = {x,y}_rad_per_rad_s2
+    :size: 4 mrad at 20 rad/s², by choice.
+    :example: x_rad_per_rad_s2 = 2e-4, y_rad_per_rad_s2 = -1e-4
+    :experiment: Make slow and fast ramps between the same two speeds: the lean is there during the ramps alone and in
+        proportion to their steepness.
+    """
 
     name = "lean_by_acceleration"
     summary = "the array leans with the angular acceleration"
@@ -194,7 +294,20 @@ class LeanByAcceleration(_OfCube):
 
 
 class LeanByTurns(_OfCube):
-    """An array that a cable leans as it winds up."""
+    """An array that a cable leans as it winds up.
+
+    A cable that winds up pulls the array over, in proportion to the angle turned since the start.
+
+    Notes
+    -----
+    :formula: n = θ·ν;
+        y = f + (n×a)·F + a·(n̈×r + 2·ω·z×(ṅ×r) + α·z×(n×r) + ω²·z×(z×(n×r)))
+    :symbols: ν = {x,y}_rad_per_rad
+    :size: 4 mrad after 20 rad, by choice.
+    :example: x_rad_per_rad = 2e-4, y_rad_per_rad = -1e-4
+    :experiment: Turn some revolutions one way, rest, and turn back: the lean comes back with the angle. Replace the
+        cable by a battery and a logger.
+    """
 
     name = "lean_by_turns"
     summary = "the array leans with the angle turned (a cable that winds up)"
@@ -219,7 +332,19 @@ class _OfSupply(Unlisted):
 
 
 class GainBySpeed(_OfSupply):
-    """A supply that sags with the speed of the motor."""
+    """A supply that sags with the speed of the motor.
+
+    The chips share the motor's supply, which sags as the motor draws current; the gain of all chips follows |ω|.
+
+    Notes
+    -----
+    :formula: y = f·(1 + k·abs(ω))
+    :symbols: k = ratio_per_rad_s
+    :size: 0.5 % at 10 rad/s, by choice. The gain of an ADXL345 rises by 3.5 % on x and y from 2.5 to 3.3 V.
+    :example: ratio_per_rad_s = 0.0005
+    :experiment: Log the supply voltage of the chips. From the recording alone: steady speeds and ramps in both
+        directions, as each follows another function of the motion.
+    """
 
     name = "gain_by_speed"
     summary = "the gain of all chips changes with |rate| (a supply that sags under the motor)"
@@ -227,7 +352,19 @@ class GainBySpeed(_OfSupply):
 
 
 class GainByRateSquared(_OfSupply):
-    """A gain that changes with the rate squared."""
+    """A gain that changes with the rate squared.
+
+    The gain of all chips changes with ω²: a supply that sags under the air drag of a fast table.
+
+    Notes
+    -----
+    :formula: y = f·(1 + k·ω²)
+    :symbols: k = ratio_per_rad2_s2
+    :size: 0.5 % at 10 rad/s, by choice.
+    :example: ratio_per_rad2_s2 = 5e-5
+    :experiment: Log the supply voltage of the chips. From the recording alone: steady speeds and ramps in both
+        directions, as each follows another function of the motion.
+    """
 
     name = "gain_by_rate_squared"
     summary = "the gain of all chips changes with the square of the rate"
@@ -235,7 +372,19 @@ class GainByRateSquared(_OfSupply):
 
 
 class GainByLoad(_OfSupply):
-    """A supply that sags when the motor accelerates."""
+    """A supply that sags when the motor accelerates.
+
+    The motor draws its largest current while it accelerates the table; the gain of all chips follows |α|.
+
+    Notes
+    -----
+    :formula: y = f·(1 + k·abs(α))
+    :symbols: k = ratio_per_rad_s2
+    :size: 0.5 % at 20 rad/s², by choice.
+    :example: ratio_per_rad_s2 = 0.0003
+    :experiment: Log the supply voltage of the chips. From the recording alone: steady speeds and ramps in both
+        directions, as each follows another function of the motion.
+    """
 
     name = "gain_by_load"
     summary = "the gain of all chips changes with |angular acceleration| (a supply that sags under the motor)"
@@ -243,7 +392,19 @@ class GainByLoad(_OfSupply):
 
 
 class GainTemperature(Unlisted):
-    """Gains of all chips that follow the board's temperature."""
+    """Gains of all chips that follow the board's temperature.
+
+    The gain of all chips is proportional to the board's temperature above 25 °C.
+
+    Notes
+    -----
+    :formula: y = f·(1 + k·(T − 25))
+    :symbols: k = ratio_per_K
+    :size: 0.1 %/K, by choice; it is wide: the ADXL345's data sheet has ±0.01 %/K.
+    :example: ratio_per_K = 0.001
+    :experiment: Warm the unit at rest, upright and on its side. A gain changes the channels that see gravity, an offset
+        changes all.
+    """
 
     name = "gain_temperature"
     summary = "the gain of all chips follows the board's temperature"
@@ -297,7 +458,19 @@ class _OfChannels(Unlisted):
 
 
 class OffsetBySpeed(_OfChannels):
-    """Offsets that follow the speed of the motor."""
+    """Offsets that follow the speed of the motor.
+
+    The motor's current or field shifts the offset of single channels, in proportion to |ω|.
+
+    Notes
+    -----
+    :formula: y = f + k·abs(ω)
+    :symbols: k = {channel}_m_s2_per_rad_s
+    :size: 5 mg at 10 rad/s, by choice.
+    :example: a11_m_s2_per_rad_s = 0.01, a22_m_s2_per_rad_s = -0.006
+    :experiment: Let the motor turn at speed with the array taken off the table and held beside it: what stays is
+        electrical.
+    """
 
     name = "offset_by_speed"
     summary = "offsets of channels change with |rate|"
@@ -305,7 +478,19 @@ class OffsetBySpeed(_OfChannels):
 
 
 class OffsetByLoad(_OfChannels):
-    """Offsets that follow the load of the motor."""
+    """Offsets that follow the load of the motor.
+
+    The motor's current while it accelerates shifts the offset of single channels, in proportion to |α|.
+
+    Notes
+    -----
+    :formula: y = f + k·abs(α)
+    :symbols: k = {channel}_m_s2_per_rad_s2
+    :size: 5 mg at 20 rad/s², by choice.
+    :example: a11_m_s2_per_rad_s2 = 0.006, a22_m_s2_per_rad_s2 = -0.004
+    :experiment: Make ramps of several steepnesses in both directions. A displaced chip reads αr with the sign of α,
+        this reads |α|.
+    """
 
     name = "offset_by_load"
     summary = "offsets of channels change with |angular acceleration|"
@@ -313,7 +498,19 @@ class OffsetByLoad(_OfChannels):
 
 
 class Cubic(_OfChannels):
-    """Third-order non-linearity per channel."""
+    """Third-order non-linearity per channel.
+
+    The reading bends with its size, with opposite sign on both sides of zero: the beginning of saturation.
+
+    Notes
+    -----
+    :formula: y = f + k·f³
+    :symbols: k = {channel}_s4_m2
+    :size: 3 mg at 1 g, by choice. The ADXL345's data sheet allows ±0.5 % of full scale for all curvature together.
+    :example: a11_s4_m2 = 5e-5, a22_s4_m2 = -3e-5
+    :experiment: Spin at several high speeds with the array upright and on its side. A gain and a cube differ only over
+        a wide span of readings of one channel.
+    """
 
     name = "cubic"
     summary = "a third-order non-linearity per channel"
@@ -334,7 +531,20 @@ class Cubic(_OfChannels):
 
 
 class LaggedTemperature(_OfChannels):
-    """Offsets that follow the board's temperature with a lag: the chip is farther from the heat than the sensor."""
+    """Offsets that follow the board's temperature with a lag: the chip is farther from the heat than the sensor.
+
+    The thermometer is nearer to the heat than the sensing element, whose temperature T′ follows with a lag.
+
+    Notes
+    -----
+    :formula: τ·Ṫ′ + T′ = T;
+        y = f + k·(T′ − 25)
+    :symbols: k = {channel}_m_s2_K; τ = time_constant_s
+    :size: 0.8 mg/K, as of `bias_temperature`.
+    :example: a11_m_s2_K = 0.02, a22_m_s2_K = -0.015, time_constant_s = 6.0
+    :experiment: Change the temperature in steps and hold it: an offset without lag settles with the thermometer, this
+        one after it.
+    """
 
     name = "lagged_temperature"
     summary = "offsets follow the board's temperature with a lag"
@@ -367,7 +577,21 @@ class LaggedTemperature(_OfChannels):
 
 
 class TemperatureGradient(LaggedTemperature):
-    """Offsets that follow the difference of temperature within the unit: between the sensor and what lags behind it."""
+    """Offsets that follow the difference of temperature within the unit: between the sensor and what lags behind it.
+
+    A difference of temperature within the unit bends its board; it is there while the temperature changes and gone when
+    the unit is evenly warm.
+
+    Notes
+    -----
+    :formula: τ·Ṫ′ + T′ = T;
+        y = f + k·(T − T′)
+    :symbols: k = {channel}_m_s2_K; τ = time_constant_s
+    :size: 0.8 mg/K, as of `bias_temperature`.
+    :example: a11_m_s2_K = 0.03, a22_m_s2_K = -0.02, time_constant_s = 6.0
+    :experiment: Warm the unit from one side and then hold it at the new temperature: the offset comes and goes, one
+        that follows the temperature stays.
+    """
 
     name = "temperature_gradient"
     summary = "offsets follow a difference of temperature within the unit, as it is while the temperature changes"

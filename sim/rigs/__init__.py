@@ -4,3 +4,7 @@
 it by a motor, such as that of `dc_motor` (`motor_file`: its table in a scenario); `mjcf_array` and `mjcf_export` read
 and write an array as MJCF.
 """
+
+from gfimu.optional_packages import require
+
+require("a scenario or a MuJoCo model", "mujoco")  # every module of this package imports it

@@ -23,7 +23,7 @@ from sim.sweep.dataset import Dataset
 from sim.sweep.engine import run_campaign
 from sim.sweep.executors import open_workers
 
-STORED = "docs/diagnosis-study.jsonl.xz"
+STORED = "docs/accuracy/diagnosis-study.jsonl.xz"
 """Outcomes of the study page, seen from the project's root."""
 
 

@@ -89,8 +89,9 @@ class Policy:
         ½. The bound of a promised rate is the quantile of the binomial count, as in the tests of hidden effects.
     promises : mapping
         Rates by study and number of hidden effects. Named alone, 0.93: the rate of ``singles`` in
-        docs/diagnosis-study.md; the others are what its tests ask (docs/diagnosis-study.md: asked are 95 % alone or in
-        an inseparable set, 98 % in any set, of pairs 88 % alone, at most 5 % wrong; unknown 90 % outside the library).
+        docs/accuracy/diagnosis-study.md; the others are what its tests ask (same page: asked are 95 %
+        alone or in an inseparable set, 98 % in any set, of pairs 88 % alone, at most 5 % wrong; unknown 90 % outside
+        the library).
         Faint lists, three effects and single effects under programmed motion have no promise of their own.
     within_three : float
         Share of the parameters of rightly named causes within three standard deviations; normal errors have 0.997.

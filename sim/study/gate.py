@@ -1,7 +1,8 @@
 """The gate: cases of all studies that one core runs in half an hour, to compare an engine with the one before.
 
-The list stands in ``gate.txt``. It was chosen once by `choose_gate` from the times in ``docs/diagnosis-study.jsonl.xz``
-and stays as it is, so that comparisons of different days are of the same cases.
+The list stands in ``gate.txt``. `choose_gate` chose it once, from the times in
+``docs/accuracy/diagnosis-study.jsonl.xz``. It stays as it is, so that comparisons of different days are of the same
+cases.
 """
 
 from __future__ import annotations

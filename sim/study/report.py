@@ -435,7 +435,7 @@ def write_report(outcomes: Sequence[Outcome], folder: str | Path) -> list[Path]:
         "Hidden worlds are drawn from fixed seeds; noise levels are not told to the tool. A size is "
         "d′ = √Σ(Δ/σ)² over all channels and the tachometer with the drive known. Made by\n\n"
         "```\npython -m sim.study run STUDY ... --out outcomes\n"
-        "python -m sim.study report docs/diagnosis-study.jsonl.xz outcomes --out docs\n```\n\n"
+        "python -m sim.study report docs/accuracy/diagnosis-study.jsonl.xz outcomes --out docs/accuracy\n```\n\n"
         "Every outcome is in `diagnosis-study.jsonl.xz`; what is run again replaces what was there.\n\n"
         f"{_REMARKS}\n{remarks}\n{_END_OF_REMARKS}\n\n"
         + summarise(outcomes)

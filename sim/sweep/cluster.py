@@ -14,6 +14,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from gfimu.errors import InputError, RecordingWarning
+from gfimu.optional_packages import require
 from sim.sweep.engine import Workers
 
 if TYPE_CHECKING:
@@ -101,10 +102,8 @@ class _Call:
 
 
 def _client(address: str, remedy: str) -> Client:
-    try:
-        from distributed import Client, rpc
-    except ImportError:
-        raise InputError('a cluster needs Dask: pip install "gfimu[cluster]"') from None
+    require("a cluster", "distributed")
+    from distributed import Client, rpc
 
     async def ask() -> str:
         async with rpc(address) as scheduler:

@@ -10,6 +10,9 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 import pyarrow as pa
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from gfimu.errors import InputError, unknown_name
@@ -20,12 +23,6 @@ from sim.sweep.design import Design
 from sim.sweep.plan import RangeTable
 from sim.sweep.sensitivity import Sensitivity, seed_shares, sensitivities
 from sim.sweep.summary import failures, numbers, result_names, share_of, varying
-
-mpl.use("Agg")
-
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
 __all__ = ["campaign_picture", "label"]
 

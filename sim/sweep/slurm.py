@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from gfimu.errors import InputError
+from gfimu.optional_packages import require
 from sim.sweep.cluster import open_cluster
 from sim.sweep.engine import Workers
 
@@ -45,10 +46,9 @@ def check_slurm() -> None:
 
 
 def _cluster() -> SLURMCluster:
-    try:
-        from dask_jobqueue.slurm import SLURMCluster
-    except ImportError:
-        raise InputError('--cluster slurm needs dask-jobqueue: pip install "gfimu[cluster]"') from None
+    require("--cluster slurm", "dask_jobqueue")
+    from dask_jobqueue.slurm import SLURMCluster
+
     try:
         return SLURMCluster()
     except ValueError as error:

@@ -16,7 +16,7 @@ from gfimu.recording import Recording
 
 @pytest.fixture(scope="module")
 def page(project_root):
-    return (project_root / "docs" / "cases.md").read_text(encoding="utf-8")
+    return (project_root / "docs" / "cases" / "cases.md").read_text(encoding="utf-8")
 
 
 @pytest.fixture

@@ -43,7 +43,7 @@ def plain_report(monkeypatch):
 
     def spare() -> None:
         monkeypatch.setattr(
-            "gfimu.diagnosis.report.folder.write_report", lambda path, diagnosis, rig: path.write_text("report")
+            "gfimu.diagnosis.report.page.write_report", lambda path, diagnosis, rig: path.write_text("report")
         )
 
     return spare

@@ -12,21 +12,22 @@ MG = 9.80665e-3
 
 
 def test_table_states_terms_total_and_limit(gfimu_command):
-    result = gfimu_command("drift", "--array", "cube12", "--time", 0.3, "--bias-mg", 35, "--monte-carlo", 50)
+    result = gfimu_command("drift", "--array", "cube12", "--duration", 0.3, "--bias-mg", 35, "--monte-carlo", 50)
     assert result.code == 0
     for words in ("bias of p", "bias of alpha", "total", "Monte Carlo / total", "The closed forms hold", "11.1 mm"):
         assert words in result.stdout
 
 
 def test_table_warns_beyond_the_limit(gfimu_command):
-    result = gfimu_command("drift", "--array", "cube12", "--time", 30, "--bias-mg", 35)
+    result = gfimu_command("drift", "--array", "cube12", "--duration", 30, "--bias-mg", 35)
     assert result.code == 0
     assert "hold for 0.454 s only" in result.stdout
 
 
 def test_json_is_the_budget_of_the_library(gfimu_command):
     result = gfimu_command(
-        "drift", "--time", 0.4, "--bias-mg", 35, "--noise-ug", 290, "--rate", 6.28, "--monte-carlo", 200, "--seed", 3,
+        "drift", "--duration", 0.4, "--bias-mg", 35, "--noise-ug", 290, "--speed-rad-s", 6.28, "--monte-carlo", 200,
+        "--seed", 3,
         "--json",
     )  # fmt: skip
     data = json.loads(result.stdout)
@@ -42,7 +43,7 @@ def test_json_is_the_budget_of_the_library(gfimu_command):
 
 
 def test_infinite_limit_is_null_in_json(gfimu_command):
-    result = gfimu_command("drift", "--time", 1, "--rate-drift-deg-h", 1e-6, "--json")
+    result = gfimu_command("drift", "--duration", 1, "--rate-drift-deg-h", 1e-6, "--json")
     assert json.loads(result.stdout)["valid_until_s"] is None
 
 
@@ -56,7 +57,7 @@ def test_array_from_a_file(gfimu_command, tmp_path):
             for place, name in chips
         )
     )
-    data = json.loads(gfimu_command("drift", "--array", file, "--time", 1, "--bias-mg", 1, "--json").stdout)
+    data = json.loads(gfimu_command("drift", "--array", file, "--duration", 1, "--bias-mg", 1, "--json").stdout)
     assert data["array"] == "mine"
     assert {t["name"]: t["size"] for t in data["terms"]}["bias of alpha"] == pytest.approx(MG / (np.sqrt(8) * 0.1))
 
@@ -66,10 +67,10 @@ def test_array_from_a_file(gfimu_command, tmp_path):
     [
         ((), "--bias-mg"),
         (("--bias-mg", "-1"), "zero or above"),
-        (("--bias-mg", "1", "--time", "0"), "above zero"),
+        (("--bias-mg", "1", "--duration", "0"), "above zero"),
         (("--bias-mg", "1", "--array", "nowhere"), "cube12"),
         (("--bias-mg", "1", "--monte-carlo", "1"), "2 or more"),
-        (("--bias-mg", "1", "--rate", "nan"), "finite"),
+        (("--bias-mg", "1", "--speed-rad-s", "nan"), "finite"),
     ],
 )
 def test_bad_input_is_one_line_and_code_2(gfimu_command, arguments, words):
@@ -97,12 +98,12 @@ def test_the_inversion_undoes_the_drift_model():
     for drift in ([3.0, 0.0, 0.0], [0.0, -7.0, 0.0]):
         rates = np.radians(np.array(drift) / 3600.0)
         error = position_error(20.0, rate_drift=rates)
-        found = gfimu.drift_from_position(tuple(error), time=20.0)
+        found = gfimu.drift_from_position(tuple(error), duration=20.0)
         assert found.rate_drift_deg_h == pytest.approx(drift, abs=1e-9)
 
 
 @pytest.mark.parametrize(
-    "words", ["--from-position 1 0 0 --bias-mg 1", "--latitude 30 --bias-mg 1", "--from-position 1 0 0 --time 0",
+    "words", ["--from-position 1 0 0 --bias-mg 1", "--latitude 30 --bias-mg 1", "--from-position 1 0 0 --duration 0",
               "--from-position 1 0 0 --latitude 91"],
 )  # fmt: skip
 def test_the_inversion_refuses_what_has_no_use(gfimu_command, words):
@@ -123,22 +124,22 @@ def rest(tmp_path_factory):
 
 def test_drift_of_a_recording_at_rest(gfimu_command, rest, tmp_path):
     picture = tmp_path / "drift.png"
-    how = ("drift", rest, "--time", 2, "--lead", 5)
+    how = ("drift", rest, "--duration", 2, "--lead", 5)
     shown = gfimu_command(*how, "--picture", picture)
     assert (shown.code, shown.stderr) == (0, "")
     for words in ("rms of 16 windows", "rms predicted from the noise", "as predicted", "--from-position"):
         assert words in " ".join(shown.stdout.split())
     assert picture.read_bytes().startswith(b"\x89PNG")
     data = json.loads(gfimu_command(*how, "--json").stdout)
-    found = gfimu.drift_of_rest(rest, time=2.0, lead=5.0)
+    found = gfimu.drift_of_rest(rest, duration=2.0, lead=5.0)
     np.testing.assert_allclose([one["position_m"] for one in data["windows"]], found.final_m)
     assert data["ratio_interval_95"][0] < data["ratio"] < data["ratio_interval_95"][1]
-    back = gfimu.drift_from_position(tuple(found.final_m[0]), time=found.time_s)
+    back = gfimu.drift_from_position(tuple(found.final_m[0]), duration=found.time_s)
     assert np.hypot(*back.rate_drift_deg_h[:2]) == pytest.approx(data["equivalent_rate_drift_deg_h"], rel=1e-6)
 
 
 def test_beyond_first_order_is_said(gfimu_command, rest):
-    shown = gfimu_command("drift", rest, "--time", 10, "--lead", 5)
+    shown = gfimu_command("drift", rest, "--duration", 10, "--lead", 5)
     assert shown.code == 0
     assert "beyond first order" in " ".join(shown.stdout.split())
 
@@ -147,7 +148,7 @@ def test_what_a_recording_at_rest_does_not_go_with(gfimu_command, rest, tmp_path
     for arguments, words in (
         ((rest, "--bias-mg", 3), "its noise is measured"),
         ((rest, "--from-position", 1, 0, 0), "its noise is measured"),
-        ((rest, "--time", 500), "the longest is 119"),
+        ((rest, "--duration", 500), "the longest is 119"),
         ((tmp_path / "none.parquet",), "no such file"),
         (("--picture", tmp_path / "x.png"), "name it first"),
         ((rest, "--picture", tmp_path / "x.txt"), ".png"),

@@ -88,7 +88,7 @@ def test_ctrl_c_is_one_line(gfimu_command, monkeypatch):
 
     monkeypatch.setattr(gfimu.commands.score, "score", interrupt)
     result = gfimu_command("score", "cube12")
-    assert (result.code, result.stderr) == (1, "gfimu: interrupted\n")
+    assert (result.code, result.stderr) == (130, "gfimu: interrupted\n")
 
 
 def test_no_argument_shows_the_help(gfimu_command):

@@ -13,7 +13,7 @@ from firmware_bridge.lpc1768.build import image_path
 
 
 def test_a_clean_image_is_exit_code_0(gfimu_command) -> None:
-    result = gfimu_command("firmware", "check", "--seconds", "0.1", "--json")
+    result = gfimu_command("firmware", "check", "--duration", "0.1", "--json")
     assert result.code == 0, result.output
     report = json.loads(result.stdout)
     assert report["faults"] == 0
@@ -26,7 +26,7 @@ def test_faults_are_exit_code_1_with_rule_place_and_remedy(gfimu_command, tmp_pa
     content = bytearray(image_path().with_suffix(".bin").read_bytes())
     content[0:4] = (0x10010000).to_bytes(4, "little")
     image.write_bytes(content)
-    result = gfimu_command("firmware", "check", image, "--seconds", "0.02")
+    result = gfimu_command("firmware", "check", image, "--duration", "0.02")
     assert result.code == 1
     assert "[red].bin" in result.stdout
     assert "vector table" in result.stdout
@@ -34,7 +34,7 @@ def test_faults_are_exit_code_1_with_rule_place_and_remedy(gfimu_command, tmp_pa
 
 
 def test_another_speed_than_the_expected_one_is_a_fault(gfimu_command) -> None:
-    result = gfimu_command("firmware", "check", "--seconds", "0.02", "--baud", "9600", "--json")
+    result = gfimu_command("firmware", "check", "--duration", "0.02", "--baud", "9600", "--json")
     assert result.code == 1
     (finding,) = [one for one in json.loads(result.stdout)["findings"] if one["severity"] == "fault"]
     assert finding["rule"] == "uart_speed"
@@ -46,7 +46,7 @@ def test_another_speed_than_the_expected_one_is_a_fault(gfimu_command) -> None:
     [
         (("nowhere.elf",), "give an ELF file"),
         (("--chips", "5"), "0 to 4"),
-        (("--seconds", "0"), "above 0 s"),
+        (("--duration", "0"), "above 0 s"),
         (("--baud", "-1"), "above 0 baud"),
     ],
 )
@@ -65,4 +65,4 @@ def test_an_image_for_another_memory_is_refused(gfimu_command, tmp_path) -> None
     assert result.code == 2
     assert "no memory" in result.stderr
     shutil.copy(image_path(), tmp_path / "gfimu.txt")
-    assert gfimu_command("firmware", "check", tmp_path / "gfimu.txt", "--seconds", "0.02").code == 0
+    assert gfimu_command("firmware", "check", tmp_path / "gfimu.txt", "--duration", "0.02").code == 0

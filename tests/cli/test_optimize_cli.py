@@ -65,7 +65,7 @@ def test_json_keeps_the_keys_it_had(gfimu_command):
 
 
 def rows_of_the_page(root):
-    page = (root / "docs" / "geometry.md").read_text(encoding="utf-8")
+    page = (root / "docs" / "theory" / "geometry.md").read_text(encoding="utf-8")
     return re.findall(r"^\| `gfimu (optimize --chips [^`]+)` \| ([\d.]+) \| ([\d.]+) \|$", page, re.MULTILINE)
 
 

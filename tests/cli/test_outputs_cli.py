@@ -69,6 +69,7 @@ CALLS = {
     "optimize": {"chips": "4", "restarts": "1"},
     "demo": {},
     "new": {"kind": "array", "out": "made.toml"},
+    "schema": {"command": "score", "out": "made.json"},
     "tolerance": {"array": "cube12", "units": "10", "workers": "1"},
     "campaign": {"plan": "in.toml", "out": "made"},
     "campaign table": {"folder": "campaign"},
@@ -149,7 +150,7 @@ def test_every_path_is_declared_as_read_or_written(name):
 
 
 def test_the_docs_list_every_command_with_its_function(project_root):
-    page = (project_root / "docs" / "commands.md").read_text(encoding="utf-8")
+    page = (project_root / "docs" / "reference" / "commands.md").read_text(encoding="utf-8")
     rows = dict(re.findall(r"^\| `gfimu ([a-z]+(?: [a-z]+)?)[^|]*\| `gfimu\.([a-z._]+)\(", page, re.MULTILINE))
     assert rows == {name: PYTHON_NAME.get(name, name.replace(" ", ".")) for name in COMMANDS}
     for flag, argument in OTHER_WORDS.items():

@@ -65,7 +65,7 @@ def test_the_readmes_python_runs(readme, gfimu_command, tmp_path, monkeypatch):
 
 def test_the_documented_csv_is_read(project_root, gfimu_command, tmp_path):
     """The format page's own example, with its ellipses filled in."""
-    text = (project_root / "docs" / "recording-format.md").read_text(encoding="utf-8")
+    text = (project_root / "docs" / "reference" / "recording-format.md").read_text(encoding="utf-8")
     (example,) = (block for block in blocks(text, "") if block.startswith("# array"))
     names = [f"a{chip}{axis}_mg" for chip in range(1, 5) for axis in range(1, 4)]
     lines = example.splitlines()

@@ -29,7 +29,8 @@ def test_tables_name_tolerances_causes_and_what_to_pay_for(gfimu_command):
 
 def test_simulated_units_stand_beside_first_order(gfimu_command, monkeypatch):
     monkeypatch.setenv("COLUMNS", "160")
-    result = gfimu_command("tolerance", "cube12", *FEW, "--calibrated", "none", "--calibrated", "rest", "--time", 2.5)
+    how = ("--calibrated", "none", "--calibrated", "rest", "--duration", 2.5)
+    result = gfimu_command("tolerance", "cube12", *FEW, *how)
     assert result.code == 0
     for words in (
         "10 simulated",
@@ -44,7 +45,7 @@ def test_json_is_the_result_of_the_function(gfimu_command):
     call = {"units": 10, "workers": 1, "calibrated": ["rest"], "time": 2.5, "seed": 3, "bias_mg": 10.0}
     data = json.loads(
         gfimu_command(
-            "tolerance", "p1_face_diagonals", "--units", 10, "--workers", 1, "--calibrated", "rest", "--time", 2.5,
+            "tolerance", "p1_face_diagonals", "--units", 10, "--workers", 1, "--calibrated", "rest", "--duration", 2.5,
             "--seed", 3, "--bias-mg", 10, "--json",
         ).stdout
     )  # fmt: skip
@@ -61,7 +62,16 @@ def test_json_is_the_result_of_the_function(gfimu_command):
 
 def test_a_scenario_and_another_part(gfimu_command):
     result = gfimu_command(
-        "tolerance", "cube12", "--closed-form", "--scenario", "paper_run", "--time", 8, "--part", "adxl355", "--json"
+        "tolerance",
+        "cube12",
+        "--closed-form",
+        "--scenario",
+        "paper_run",
+        "--duration",
+        8,
+        "--part",
+        "adxl355",
+        "--json",
     )
     data = json.loads(result.stdout)
     assert data["motion"] == "scenario paper_run, 8 s"
@@ -70,7 +80,7 @@ def test_a_scenario_and_another_part(gfimu_command):
 
 
 def test_a_body_in_free_motion(gfimu_command):
-    result = gfimu_command("tolerance", "cube12", *FEW, "--scenario", "tumble", "--time", 3, "--calibrated", "none")
+    result = gfimu_command("tolerance", "cube12", *FEW, "--scenario", "tumble", "--duration", 3, "--calibrated", "none")
     assert result.code == 0
     assert "scenario tumble" in result.stdout
 
@@ -87,13 +97,13 @@ def test_an_array_of_which_no_unit_can_be_estimated(gfimu_command, tmp_path):
 @pytest.mark.parametrize("suffix", ["png", "svg"])
 def test_picture(gfimu_command, tmp_path, suffix):
     file = tmp_path / f"tolerance.{suffix}"
-    result = gfimu_command("tolerance", "cube12", *FEW, "--calibrated", "rest", "--time", 2.5, "--out", file)
+    result = gfimu_command("tolerance", "cube12", *FEW, "--calibrated", "rest", "--duration", 2.5, "--picture", file)
     assert result.code == 0
     assert file.stat().st_size > 10_000
 
 
 def test_picture_of_nothing(gfimu_command, tmp_path):
-    zero = ["--placement-mm", "--angle-deg", "--bias-mg", "--gain-percent", "--cross-axis-percent", "--noise-ug"]
+    zero = ["--position-mm", "--angle-deg", "--bias-mg", "--gain-percent", "--cross-axis-percent", "--noise-ug"]
     zero += ["--nonlinearity-percent", "--temperature-k"]
     words = [word for option in zero for word in (option, 0)]
     result = gfimu_command("tolerance", "cube12", "--closed-form", *words, "--out", tmp_path / "nothing.png")
@@ -104,26 +114,26 @@ def test_picture_of_nothing(gfimu_command, tmp_path):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ("cube12 --placement-mm -0.1", "--placement-mm -0.1"),
+        ("cube12 --position-mm -0.1", "--position-mm -0.1"),
         ("cube12 --angle-deg nan", "--angle-deg nan"),
         ("cube12 --bias-mg inf", "--bias-mg inf"),
         ("cube12 --noise-ug -1", "--noise-ug -1"),
-        ("cube12 --placement-mm 1e9", "placement_m"),
+        ("cube12 --position-mm 1e9", "placement_m"),
         ("cube12 --units 0", "--units 0"),
         ("cube12 --units 1000000000", "--units 1000000000"),
         ("cube12 --workers 0", "--workers 0"),
         ("cube12 --seed -1", "--seed -1"),
-        ("cube12 --time 1", "--time 1"),
-        ("cube12 --time nan", "--time nan"),
-        ("cube12 --rate 0", "--rate 0"),
-        ("cube12 --time 1e9", "samples"),
-        ("cube12 --scenario paper_run --time 31", "lasts 30 s"),
+        ("cube12 --duration 1", "--duration 1"),
+        ("cube12 --duration nan", "--duration nan"),
+        ("cube12 --speed-rad-s 0", "--speed-rad-s 0"),
+        ("cube12 --duration 1e9", "samples"),
+        ("cube12 --scenario paper_run --duration 31", "lasts 30 s"),
         ("cube12 --scenario nonsense", "nonsense"),
         ("cube12 --calibrated nonsense", "poses+rest"),
         ("cube12 --part nonsense", "nonsense"),
         ("nonsense", "nonsense"),
         ("p1_face_diagonals --calibrated poses", "three orthogonal axes"),
-        ("cube12 --scenario calibration_poses --time 20 --calibrated rest --rate 3 --set x", "--set"),
+        ("cube12 --scenario calibration_poses --duration 20 --calibrated rest --speed-rad-s 3 --set x", "--set"),
         ("one_chip", "can't see"),
     ],
 )

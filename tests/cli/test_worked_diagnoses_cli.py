@@ -17,7 +17,7 @@ from sim.twin import Twin
 
 @pytest.fixture(scope="module")
 def script(project_root):
-    path = project_root / "docs" / "make_worked_diagnoses.py"
+    path = project_root / "docs" / "scripts" / "make_worked_diagnoses.py"
     specification = importlib.util.spec_from_file_location("make_worked_diagnoses", path)
     module = importlib.util.module_from_spec(specification)
     sys.modules[specification.name] = module  # dataclasses look their module up
@@ -27,7 +27,7 @@ def script(project_root):
 
 @pytest.fixture(scope="module")
 def page(project_root):
-    return (project_root / "docs" / "worked_diagnoses.md").read_text(encoding="utf-8")
+    return (project_root / "docs" / "cases" / "worked_diagnoses.md").read_text(encoding="utf-8")
 
 
 def commands(page, name):

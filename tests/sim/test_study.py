@@ -123,8 +123,8 @@ def test_the_tables_can_be_made_again_from_what_is_kept_beside_them(tmp_path):
 
 
 def test_the_page_of_the_study_is_that_of_the_outcomes_beside_it(project_root):
-    page = (project_root / "docs" / "diagnosis-study.md").read_text(encoding="utf-8")
-    assert summarise(read_outcomes(project_root / "docs" / "diagnosis-study.jsonl.xz")) in page
+    page = (project_root / "docs" / "accuracy" / "diagnosis-study.md").read_text(encoding="utf-8")
+    assert summarise(read_outcomes(project_root / "docs" / "accuracy" / "diagnosis-study.jsonl.xz")) in page
 
 
 @pytest.mark.parametrize(

@@ -153,7 +153,7 @@ def test_files_that_cannot_be_compared_are_one_clear_line(tmp_path, capsys, twen
 
 def test_the_stored_outcomes_stay_within_the_policy(project_root):
     """What the study page states is what the promises ask."""
-    stored = load_outcomes(project_root / "docs" / "diagnosis-study.jsonl.xz")
+    stored = load_outcomes(project_root / "docs" / "accuracy" / "diagnosis-study.jsonl.xz")
     found = compare(stored, stored)
     assert not found.left
     assert {study for study, _ in POLICY.promises} - {key.partition("/")[0] for key, _ in stored} == {

@@ -28,7 +28,7 @@ from sim.sweep.plan import PlanFile
 
 @pytest.fixture(scope="module")
 def stored(request):
-    return load_outcomes(request.config.rootpath / "docs" / "diagnosis-study.jsonl.xz")
+    return load_outcomes(request.config.rootpath / "docs" / "accuracy" / "diagnosis-study.jsonl.xz")
 
 
 def test_the_gate_has_every_kind_of_case(stored):

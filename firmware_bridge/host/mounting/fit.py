@@ -60,5 +60,6 @@ def open_array_text(candidates: tuple[AccelerometerArray, ...], fit: FirstSample
         shown = "the samples fit none of them"
     return (
         f"neither the board nor --array states the array, so the recording carries none: {' or '.join(named)}? "
-        f"{shown}; record with --array NAME, or settle it with gfimu convert {out} NEW --array NAME (docs/bench.md)"
+        f"{shown}; record with --array NAME, or settle it with gfimu convert {out} NEW --array NAME "
+        "(docs/how_to/bench.md)"
     )

@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
 
 from gfimu.diagnosis.data.run import Run, prepare_run
 from gfimu.diagnosis.design.distinguishability import (
@@ -23,9 +25,10 @@ from gfimu.errors import InputError
 from gfimu.importing.oddities import oddities
 from gfimu.recording import Recording
 from gfimu.recording.checks import check_recording
+from gfimu.results import Panel, PlottedResult, Series, text_column
 from gfimu.world_model import WorldModel, is_linear, reads_place
 
-__all__ = ["EffectView", "RunCheck", "UsefulRun", "check_runs"]
+__all__ = ["EffectView", "RunCheck", "UsefulRun", "check_runs", "turns_one_way"]
 
 
 @dataclass(frozen=True)
@@ -81,7 +84,7 @@ class EffectView:
 
 
 @dataclass(frozen=True)
-class RunCheck:
+class RunCheck(PlottedResult):
     """What recordings can show.
 
     Parameters
@@ -100,6 +103,28 @@ class RunCheck:
     findings: tuple[str, ...]
     effects: tuple[EffectView, ...]
     advice: tuple[str, ...]
+
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """Return one row per effect: how well the motion shows it, and what it is confounded with."""
+        return {
+            "effect": text_column(one.name for one in self.effects),
+            "detectability": np.array([one.detectability for one in self.effects], dtype=float),
+            "seen": np.array([one.seen for one in self.effects], dtype=bool),
+            "confused_with": text_column(", ".join(one.confused_with) for one in self.effects),
+        }
+
+    def _heading(self) -> str:
+        return "What the recordings can show"
+
+    def _notes(self) -> tuple[str, ...]:
+        return (*self.findings, *self.advice)
+
+    def _panels(self) -> list[Panel]:
+        names = tuple(one.name for one in self.effects)
+        sizes = Series("", np.array([one.detectability for one in self.effects], dtype=float))
+        return [
+            Panel("detectability of effects of usual size", "d′, standard deviations", (sizes,), names, scale="zero")
+        ]
 
     def to_dict(self) -> dict[str, Any]:
         """Return the check as JSON holds it."""
@@ -162,7 +187,7 @@ def _facts(run: Run, name: str, model: WorldModel, useful: UsefulRun) -> dict[st
     place = drive if is_linear(model) else np.unwrap(drive)
     rate = np.gradient(place, t) if reads_place(model) else drive
     unit, slow = ("m", useful.speed) if is_linear(model) else ("rad", useful.rate)
-    turns = {} if is_linear(model) else {"turns": float(np.abs(np.trapezoid(rate, t)) / (2.0 * np.pi))}
+    turns = {} if is_linear(model) else {"turns": turns_one_way(rate, t)}
     return {
         "name": name,
         "duration_s": run.duration,
@@ -174,6 +199,11 @@ def _facts(run: Run, name: str, model: WorldModel, useful: UsefulRun) -> dict[st
         "share_backwards": float(np.mean(rate < -slow)),
         "share_at_rest": float(np.mean(np.abs(rate) < 0.1 * slow)),
     }
+
+
+def turns_one_way(rate: NDArray[np.float64], t: NDArray[np.float64]) -> float:
+    """Return the most turns between two places of the table: turning back takes none away."""
+    return float(np.ptp(cumulative_trapezoid(rate, t, initial=0.0)) / (2.0 * np.pi))
 
 
 def _temperature(recording: Recording) -> dict[str, float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import io
 import re
 import zlib
@@ -14,6 +15,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import SymLogNorm
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
+from PIL import Image
 from scipy.ndimage import uniform_filter1d
 
 from gfimu.diagnosis.criticism.views.dependence import Dependence, Fingerprint
@@ -30,6 +32,7 @@ from gfimu.visual.colours import (
     DIVERGING,
     INK,
     NOISE_ON_PAPER,
+    PAGE,
     PALE,
     chip_colour,
     css,
@@ -37,23 +40,27 @@ from gfimu.visual.colours import (
 from gfimu.visual.rig.figure import array_figure, channel_style
 
 __all__ = [
-    "before_after_figure",
+    "bars_figure",
     "channels_figure",
     "dependence_figure",
     "fingerprint_figure",
     "rig_figure",
     "rigid_figure",
     "spectrum_figure",
+    "themed",
+    "trace_figure",
     "whiteness_figure",
 ]
 
 _BEFORE, _AFTER = css(BEFORE_ON_PAPER), css(AFTER_ON_PAPER)
 _NOISE, _INK, _PALE = css(NOISE_ON_PAPER), css(INK), css(PALE)
 _STRONGEST = 4  # channels drawn in colour
+_MANY = 24  # channels, of more of which pictures are coarser so that the page stays small
 _MOST_POINTS = 4000
 _MOST_FREQUENCIES = 1200
-_DPI = 110
+_DPI, _COARSE_DPI = 110, 55
 _SMOOTH_S = 0.15
+_GRID = "#ededed"  # of `array_figure`
 _STYLE = {
     "font.family": "sans-serif",
     "font.size": 10,
@@ -70,18 +77,26 @@ _STYLE = {
 }
 
 
-def before_after_figure(run: RunView, size: ResidualSize) -> str:
-    """Draw the residual of the channel that was worst, and the rms of every channel, before and after."""
+def trace_figure(run: RunView, size: ResidualSize) -> str:
+    """Draw the residual of the channel that was worst, before and after."""
     with mpl.rc_context(_STYLE):
-        figure = Figure(figsize=(11.0, 3.3), layout="constrained")
-        trace, bars = figure.subplots(1, 2, width_ratios=[3, 2])
-        worst = int(np.nanargmax(size.before / size.floor))
-        _trace(trace, run, worst, size.floor[worst])
-        trace.set_title(f"measured − predicted, channel {size.channels[worst]}", loc="left", fontsize=10.5)
-        trace.set_ylabel("m/s²")
-        trace.set_xlabel("time, s")
-        _legend_above(trace)
-        _bars(bars, size)
+        figure = Figure(figsize=(11.0, 3.0), layout="constrained")
+        axis = figure.subplots()
+        excess = np.nan_to_num(size.before / size.floor, nan=-1.0, posinf=0.0)
+        worst = int(np.argmax(excess))
+        _trace(axis, run, worst, size.floor[worst])
+        axis.set_title(f"measured − predicted, channel {size.channels[worst]}", loc="left", fontsize=10.5)
+        axis.set_ylabel("m/s²")
+        axis.set_xlabel("time, s")
+        _legend_above(axis)
+        return _svg(figure)
+
+
+def bars_figure(size: ResidualSize) -> str:
+    """Draw the rms of the residual of every channel, before and after, beside its noise."""
+    with mpl.rc_context(_STYLE):
+        figure = Figure(figsize=(11.0, 2.3), layout="constrained")
+        _bars(figure.subplots(), size)
         return _svg(figure)
 
 
@@ -105,7 +120,7 @@ def channels_figure(run: RunView, size: ResidualSize, array: AccelerometerArray)
             axis.set_ylabel("m/s²")
         for axis in axes[-1]:
             axis.set_xlabel("time, s")
-        return _svg(figure)
+        return _svg(figure, _DPI if count <= _MANY else _COARSE_DPI)
 
 
 def rig_figure(
@@ -122,11 +137,14 @@ def dependence_figure(dependence: Dependence, array: AccelerometerArray) -> str:
         figure = Figure(figsize=(5.4, 2.3), layout="constrained")
         pair = figure.subplots(1, 2, sharey=True)
         strongest = list(np.argsort(-dependence.amplitude_before)[:_STRONGEST])
+        many = array.n_channels > _MANY
         for axis, mean, title in zip(pair, (dependence.before, dependence.after), ("before", "after"), strict=True):
             axis.axhline(0.0, color=_NOISE, linewidth=0.6)
             for channel in range(array.n_channels):
                 if channel not in strongest:
-                    axis.plot(dependence.centres[:, channel], mean[:, channel], color=_PALE, linewidth=0.8)
+                    axis.plot(
+                        dependence.centres[:, channel], mean[:, channel], color=_PALE, linewidth=0.8, rasterized=many
+                    )
             for channel in strongest:
                 colour, line = channel_style(array, channel)
                 axis.plot(
@@ -217,7 +235,7 @@ def fingerprint_figure(fingerprint: Fingerprint) -> str:
         pair = figure.subplots(1, 2, sharey=True)
         norm = SymLogNorm(linthresh=Policy.noise_stds, vmin=-largest, vmax=largest)
         for axis, values, title in zip(pair, (fingerprint.before, fingerprint.after), ("before", "after"), strict=True):
-            shown = np.where(np.abs(values) < Policy.noise_stds, 0.0, values)
+            shown = np.ma.masked_where(np.abs(values) < Policy.noise_stds, values)  # the page shows through
             axis.imshow(shown, cmap=DIVERGING, norm=norm, aspect="auto", interpolation="nearest")
             axis.set_xticks(range(terms), fingerprint.terms, rotation=40, ha="right")
             axis.set_yticks(range(count), fingerprint.channels)
@@ -235,14 +253,15 @@ def fingerprint_figure(fingerprint: Fingerprint) -> str:
 
 def _trace(axis: Axes, run: RunView, channel: int, floor: float) -> None:
     """Residual of one channel over time: samples pale, their moving mean strong, noise as a band of ±2σ."""
-    period = float(run.t[1] - run.t[0])
-    for prediction, colour, label, order in ((run.before, _BEFORE, "before", 2), (run.after, _AFTER, "after", 3)):
+    period = float(np.median(np.diff(run.t))) if len(run.t) > 1 else 1.0
+    for prediction, colour, label, order in ((run.before, _BEFORE, "before", 1.2), (run.after, _AFTER, "after", 1.3)):
         residual = np.where(run.valid[:, channel], run.measured[:, channel] - prediction[:, channel], np.nan)
         t, shown = _thinned(run.t, residual)
         axis.plot(t, shown, color=colour, linewidth=0.5, alpha=0.3, rasterized=True, zorder=order)
         mean = _moving_mean(residual, max(round(_SMOOTH_S / period), 1))
         t, shown = _thinned(run.t, mean)
-        axis.plot(t, shown, color=colour, linewidth=1.1, label=label, rasterized=True, zorder=order + 2)
+        axis.plot(t, shown, color=colour, linewidth=1.1, label=label, rasterized=True, zorder=order + 0.2)
+    # Below the frame of the axes (2.5) and side by side in depth: all samples become one picture.
     axis.axhspan(-2 * floor, 2 * floor, color=_PALE, alpha=0.55, linewidth=0, label="noise, ±2σ", zorder=1)
     axis.margins(x=0.01)
 
@@ -290,19 +309,49 @@ def _legend_above(axis: Axes) -> None:
         line.set_linewidth(2.0)
 
 
-def _svg(figure: Figure) -> str:
+def _svg(figure: Figure, dpi: int = _DPI) -> str:
     buffer = io.StringIO()
     if layout := figure.get_layout_engine():  # laid out here, as a figure that is saved with a layout is drawn twice
         FigureCanvasSVG(figure)
         figure.set_dpi(72)  # points per inch, in which SVG is laid out
         layout.execute(figure)
         figure.set_layout_engine(None)
-    figure.savefig(buffer, format="svg", dpi=_DPI, metadata={"Date": None})
+    figure.savefig(buffer, format="svg", dpi=dpi, metadata={"Date": None})
     text = buffer.getvalue()
     text = text[text.index("<svg") :]
     text = re.sub(r"<metadata>.*?</metadata>", "", text, count=1, flags=re.DOTALL)
     text = re.sub(r'(<image\b[^>]*?) id="[^"]*"', r"\1", text)  # equal pictures would share one name
+    text = re.sub(r"(?<=base64,)[^\"]+", lambda match: _few_colours(match.group()), text)
+    text = _shortened(text)
     # Several figures share one page: their definitions must not share names; the size follows the page.
     tag = f"f{zlib.crc32(text.encode()):08x}"
     text = re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{tag}_", text)
     return re.sub(r"<svg [^>]*>", lambda match: re.sub(r' (width|height)="[^"]*"', "", match.group(0)), text, count=1)
+
+
+def _shortened(svg: str) -> str:
+    """Return a figure without comments, without names that nothing refers to, and with two decimals of a point."""
+    svg = re.sub(r"<!--.*?-->", "", svg, flags=re.DOTALL)
+    used = set(re.findall(r'(?:url\(|href=")#([^)"]+)', svg))
+    svg = re.sub(r' id="([^"]+)"', lambda match: match[0] if match[1] in used else "", svg)
+    svg = re.sub(r"<defs>\s*<style[^>]*>.*?</style>\s*</defs>", "", svg, flags=re.DOTALL)
+    svg = re.sub(r"(?<=[ \"(,-])\d+\.\d{3,}", lambda match: f"{float(match[0]):.2f}".rstrip("0").rstrip("."), svg)
+    return re.sub(r"\s*\n\s*", " ", svg)
+
+
+def _few_colours(picture: str) -> str:
+    """Return a PNG picture in base64 with at most 64 colours, which is a third as long."""
+    image = Image.open(io.BytesIO(base64.b64decode(picture))).convert("RGBA")
+    buffer = io.BytesIO()
+    image.quantize(64, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE).save(buffer, "png", optimize=True)
+    return base64.b64encode(buffer.getvalue()).decode("ascii")
+
+
+def themed(svg: str, chips: int) -> str:
+    """Return a figure whose colours are those of the page, by day and by night, in place of fixed ones."""
+    names = {
+        css(PAGE["light"][name]): name for name in ("card", "ink", "noise", "band", "before", "after", "spin-axis")
+    }
+    names[_GRID] = "line"
+    names |= {css(chip_colour(number, on_paper=True)): f"chip-{number}" for number in range(chips)}
+    return re.sub(r"#[0-9a-f]{6}\b", lambda match: f"var(--{names[match[0]]})" if match[0] in names else match[0], svg)

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
 
-from gfimu.diagnosis.report.page import write_report
-from gfimu.diagnosis.report.picture import write_picture
 from gfimu.diagnosis.report.rig import DrawnRig
 from gfimu.diagnosis.verdict.verdict import Diagnosis
+from gfimu.errors import OmittedFileWarning
 from gfimu.files.atomic_file import atomic_folder
 from gfimu.files.outputs import OutputFolder, check_outputs
+from gfimu.optional_packages import install_command, missing, packages_of
 
-__all__ = ["FILES", "check_folder", "write_diagnosis"]
+__all__ = ["FILES", "check_folder", "files_to_write", "warn_of_omitted", "write_diagnosis"]
 
 FILES: Mapping[str, str] = {
     "verdict.json": "verdict",
@@ -21,6 +22,27 @@ FILES: Mapping[str, str] = {
     "diagnosis.rrd": "rerun recording",
 }
 """What the folder holds and what it is called."""
+
+_NEEDS = {"report.html": "matplotlib", "diagnosis.rrd": "rerun"}
+"""Optional packages that draw files of the folder; without one its file is left out."""
+
+
+def files_to_write() -> dict[str, str]:
+    """Return what the folder will hold with the packages that are installed, as `FILES`."""
+    absent = missing(*_NEEDS.values())
+    return {name: meaning for name, meaning in FILES.items() if _NEEDS.get(name) not in absent}
+
+
+def warn_of_omitted() -> None:
+    """Warn of files that will not be written, as the packages that draw them are not installed."""
+    absent = missing(*_NEEDS.values())
+    if absent:
+        names = " and ".join(name for name in FILES if _NEEDS.get(name) in absent)
+        warnings.warn(
+            f"{names} not written: {packages_of(absent)} not installed; run: {install_command(absent)}",
+            OmittedFileWarning,
+            stacklevel=3,
+        )
 
 
 def check_folder(directory: str | Path) -> Path:
@@ -45,6 +67,8 @@ def write_diagnosis(
     rig: DrawnRig | None = None,
 ) -> dict[str, Path]:
     """Write all files of a diagnosis; what stands in the folder already is replaced only when all are made.
+
+    The report needs matplotlib and the rerun recording rerun-sdk: where one is not installed, its file is left out.
 
     Parameters
     ----------
@@ -72,6 +96,13 @@ def write_diagnosis(
         # Part files of the user's are named by the twin or its array, and looked up beside them.
         for name, text in {**diagnosis.twin.array.part_files, **(more or {})}.items():
             (made / name).write_text(text, encoding="utf-8")
-        write_report(made / "report.html", diagnosis, rig)
-        write_picture(made / "diagnosis.rrd", diagnosis, rig=rig)
-    return {meaning: folder / name for name, meaning in FILES.items()}
+        files = files_to_write()
+        if "report.html" in files:
+            from gfimu.diagnosis.report.page import write_report
+
+            write_report(made / "report.html", diagnosis, rig)
+        if "diagnosis.rrd" in files:
+            from gfimu.diagnosis.report.picture import write_picture
+
+            write_picture(made / "diagnosis.rrd", diagnosis, rig=rig)
+    return {meaning: folder / name for name, meaning in files.items()}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from jinja2 import Environment, FileSystemLoader, select_autoescape
 from gfimu import __version__
 from gfimu.diagnosis.criticism.views.residuals import ResidualViews, residual_views
 from gfimu.diagnosis.criticism.views.rigid_motion import RigidMotion
+from gfimu.diagnosis.criticism.views.run_view import RunView
 from gfimu.diagnosis.report import figures
 from gfimu.diagnosis.report.plain_words import (
     gain_rows,
@@ -26,10 +28,13 @@ from gfimu.diagnosis.report.plain_words import (
     summary,
 )
 from gfimu.diagnosis.report.rig import DrawnRig
+from gfimu.diagnosis.report.zooming import dependence_plot, residual_plot, spectrum_plot
 from gfimu.diagnosis.verdict.verdict import Diagnosis, NamedCause
 from gfimu.diagnosis.verdict.wording import SAME_SHARE
 from gfimu.files.atomic_file import write_text
-from gfimu.visual.colours import INK, TONES, chip_colour, css
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.visual.colours import PAGE, chip_colour, css
+from gfimu.visual.page import Packed, page_plots
 from gfimu.visual.rig import package_of
 from gfimu.visual.rig.words import package_words, scene_title
 
@@ -51,6 +56,7 @@ _VIEWS = (
     ("reading", "over the reading itself"),
 )
 _MOST_PARAMETERS = 14
+_FIRST_PARAMETERS = 4  # beside the headline
 
 
 def write_report(path: str | Path, diagnosis: Diagnosis, rig: DrawnRig | None = None) -> None:
@@ -79,17 +85,23 @@ def report_html(diagnosis: Diagnosis, rig: DrawnRig | None = None) -> str:
 
 
 def _content(diagnosis: Diagnosis, rig: DrawnRig) -> Mapping[str, Any]:
-    channels = diagnosis.twin.array.channels
+    array = diagnosis.twin.array
     bias_instability = float(diagnosis.noise.get("bias_instability_m_s2", 0.0))
-    seen = [run for run in diagnosis.runs if run.valid.any()]
-    views = [residual_views(run, channels, bias_instability=bias_instability) for run in seen]
+    seen = [run for run in diagnosis.runs if run.valid.any() and len(run.t) > 1]
+    found = [residual_views(run, array.channels, bias_instability=bias_instability) for run in seen]
     label, tone = _VERDICTS[diagnosis.verdict]
     label += " in part" if diagnosis.in_part else ""
+    data, plots = Packed(), {}
+    if seen:
+        plots["residual"] = residual_plot(seen[0], found[0].size, array, data)
+    shown = _views(diagnosis, found[0], plots, data) if found else []
     return {
         "version": __version__,
         "label": label,
         "tone": tone,
-        "colours": {name: css(colour) for name, colour in TONES.items()} | {"ink": css(INK)},
+        "themes": _themes(len(array.chips)),
+        "plots": page_plots({"plots": plots}, data),
+        "plot_rule": _plot_rule(plots["residual"]["grouped"]) if seen else "",
         "array": _array(diagnosis, rig),
         "headline": headline(diagnosis),
         "story": story(diagnosis),
@@ -108,24 +120,49 @@ def _content(diagnosis: Diagnosis, rig: DrawnRig) -> Mapping[str, Any]:
         "noise": diagnosis.noise,
         "noise_texts": noise_texts(diagnosis.noise),
         "linear": any(run.linear for run in seen),
-        "runs": [
-            {
-                "name": run.name,
-                "samples": len(run.t),
-                "duration": run.t[-1] - run.t[0],
-                "fastest": float(np.abs(run.rate).max()),
-                "lost": int((~run.valid.any(axis=1)).sum()),
-                "dead": [
-                    name for name, alive in zip(channels, np.asarray(run.valid.any(axis=0)), strict=True) if not alive
-                ],
-                "picture": figures.before_after_figure(run, view.size),
-                "sentences": view.sentences,
-            }
-            for run, view in zip(seen, views, strict=True)
-        ],
-        "views": _views(diagnosis, views[0]) if views else [],
-        "channels_picture": figures.channels_figure(seen[0], views[0].size, diagnosis.twin.array) if views else "",
-        "fingerprint": figures.fingerprint_figure(views[0].fingerprint) if views else "",
+        "runs": [_run(run, views, array) for run, views in zip(seen, found, strict=True)],
+        "views": shown,
+        "channels_picture": _picture(figures.channels_figure(seen[0], found[0].size, array), array) if found else "",
+        "fingerprint": _picture(figures.fingerprint_figure(found[0].fingerprint), array) if found else "",
+    }
+
+
+def _themes(chips: int) -> Mapping[str, Mapping[str, str]]:
+    """Return the colours of the page by day and by night, with one for each chip."""
+    return {
+        theme: {name: css(colour) for name, colour in colours.items()}
+        | {f"chip-{number}": css(chip_colour(number, on_paper=theme == "light")) for number in range(chips)}
+        for theme, colours in PAGE.items()
+    }
+
+
+def _picture(svg: str, array: AccelerometerArray) -> str:
+    return figures.themed(svg, len(array.chips))
+
+
+def _plot_rule(grouped: int) -> str:
+    """Return what the pale lines of the residual plot are."""
+    return f"lowest and highest of every {grouped} samples" if grouped else "every sample"
+
+
+def _run(run: RunView, views: ResidualViews, array: AccelerometerArray) -> Mapping[str, Any]:
+    """Return what the page says and draws of a run."""
+    size, alive = views.size, np.asarray(run.valid.any(axis=0))
+    worst = int(np.argmax(np.nan_to_num(size.before / size.floor, nan=-1.0, posinf=0.0)))
+    return {
+        "name": run.name,
+        "samples": len(run.t),
+        "duration": run.t[-1] - run.t[0],
+        "fastest": float(np.abs(run.rate).max()),
+        "lost": int((~run.valid.any(axis=1)).sum()),
+        "dead": [name for name, good in zip(array.channels, alive, strict=True) if not good],
+        "trace": _picture(figures.trace_figure(run, size), array),
+        "bars": _picture(figures.bars_figure(size), array),
+        "summary": (
+            f"Residual of {size.channels[worst]}, the channel furthest above its noise: rms {size.before[worst]:.3g} "
+            f"m/s² before, {size.after[worst]:.3g} m/s² after; its noise is {size.floor[worst]:.3g} m/s²."
+        ),
+        "sentences": views.sentences,
     }
 
 
@@ -137,16 +174,15 @@ def _array(diagnosis: Diagnosis, rig: DrawnRig) -> dict[str, Any]:
         "title": scene_title(array),
         "package": package_words(package_of(array)),
         "description": array.description,
-        "picture": figures.rig_figure(array, axis, gravity, name),
+        "picture": _picture(figures.rig_figure(array, axis, gravity, name), array),
         "chips": [
             {
                 "name": chip.name,
-                "colour": css(chip_colour(number, on_paper=True)),
                 "channels": ", ".join(chip.channels),
                 "place": ", ".join(f"{1000.0 * part + 0.0:.4g}" for part in chip.position),
                 "part": chip.part,
             }
-            for number, chip in enumerate(array.chips)
+            for chip in array.chips
         ],
     }
 
@@ -192,6 +228,7 @@ def _cause(diagnosis: Diagnosis, cause: NamedCause) -> Mapping[str, Any]:
         "name": cause.effect,
         "summary": summary(diagnosis, cause),
         "parameters": parameters[:_MOST_PARAMETERS],
+        "first": [one for one in every if one.significant][:_FIRST_PARAMETERS],
         "more": max(len(every) - min(len(parameters), _MOST_PARAMETERS), 0),
         "probability": percent(cause.probability),
         "why": cause.why.removeprefix(summary(diagnosis, cause)).lstrip("; "),
@@ -200,35 +237,43 @@ def _cause(diagnosis: Diagnosis, cause: NamedCause) -> Mapping[str, Any]:
     }
 
 
-def _views(diagnosis: Diagnosis, views: ResidualViews) -> list[Mapping[str, Any]]:
-    """Return title, sentence and picture of each residual view of the first run."""
+def _views(diagnosis: Diagnosis, views: ResidualViews, plots: dict[str, Any], data: Packed) -> list[Mapping[str, Any]]:
+    """Return title, sentence and picture of each residual view of the first run; those that zoom go to ``plots``."""
     array = diagnosis.twin.array
     shown: list[Mapping[str, Any]] = []
+
+    def show(title: str, view: Any, picture: str, caption: str, plot: dict[str, Any] | None = None) -> None:
+        name = "" if plot is None else title.replace(" ", "-").replace("'", "")
+        if plot is not None:
+            plots[name] = plot
+        words = {"title": title, "sentence": view.sentence, "looks": view.looks, "caption": caption}
+        shown.append({**words, "picture": _picture(picture, array), "plot": name})
+
     for name, title in _VIEWS:
-        dependence = views.by_view(name)
-        if dependence is not None:
-            picture = figures.dependence_figure(dependence, array)
-            shown.append(
-                {"title": title, "sentence": dependence.sentence, "picture": picture, "looks": dependence.looks}
-            )
+        if (dependence := views.by_view(name)) is not None:
+            strongest = array.channels[int(np.argmax(np.nan_to_num(dependence.amplitude_before)))]
+            caption = f"Mean residual over {dependence.quantity}; {strongest} follows it most."
+            plot = dependence_plot(dependence, array, data)
+            show(title, dependence, figures.dependence_figure(dependence, array), caption, plot)
     for spectrum, title in ((views.spectrum, "over frequency"), (views.orders, "over cycles per revolution")):
         if spectrum is not None:
-            picture = figures.spectrum_figure(spectrum)
-            shown.append({"title": title, "sentence": spectrum.sentence, "picture": picture, "looks": spectrum.looks})
+            caption = "Rms over the channels beside that of noise; drawn at its peaks."
+            show(title, spectrum, figures.spectrum_figure(spectrum), caption, spectrum_plot(spectrum, data))
     if diagnosis.rigid is not None and diagnosis.rigid.combinations:
-        picture, sentence = figures.rigid_figure(diagnosis.rigid.power), _place(diagnosis.rigid)
-        shown.append(
-            {
-                "title": "whose motion is it?",
-                "sentence": sentence,
-                "picture": picture,
-                "looks": len(diagnosis.rigid.excesses),
-            }
-        )
-    picture = figures.whiteness_figure(views.whiteness)
-    looks = views.whiteness.looks
-    shown.append({"title": "is it noise?", "sentence": views.whiteness.sentence, "picture": picture, "looks": looks})
+        rigid = _RigidView(_place(diagnosis.rigid), len(diagnosis.rigid.excesses))
+        caption = "Power over that of noise, of the given simulation's residual, by what moves together."
+        show("whose motion is it?", rigid, figures.rigid_figure(diagnosis.rigid.power), caption)
+    caption = "Cumulative periodogram of each channel; that of noise stays in the band."
+    show("is it noise?", views.whiteness, figures.whiteness_figure(views.whiteness), caption)
     return shown
+
+
+@dataclass(frozen=True)
+class _RigidView:
+    """Sentence and number of looks of the division of the residual."""
+
+    sentence: str
+    looks: int
 
 
 def _place(rigid: RigidMotion) -> str:

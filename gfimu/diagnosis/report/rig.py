@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,9 @@ from scipy.spatial.transform import Rotation
 from gfimu.diagnosis.criticism.views.run_view import RunView
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.geometry.turning_axis import TurningAxis
-from gfimu.visual.scene import Shape
+
+if TYPE_CHECKING:
+    from gfimu.visual.scene import Shape
 
 __all__ = ["DrawnRig"]
 

@@ -9,12 +9,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.criticism.views.rigid_motion import RigidMotion
 from gfimu.diagnosis.criticism.views.run_view import RunView
 from gfimu.diagnosis.policy import Policy
 from gfimu.files.atomic_file import write_text
+from gfimu.results import Panel, PlottedResult, Series
 from gfimu.short_repr import joined
 from gfimu.world_model import WorldModel
 
@@ -171,7 +173,7 @@ class Unexplained:
 
 
 @dataclass(frozen=True)
-class Diagnosis:
+class Diagnosis(PlottedResult):
     """The result of a diagnosis.
 
     Parameters
@@ -205,6 +207,8 @@ class Diagnosis:
         them; it is in their own probabilities. NaN where no cause was inferred.
     coincidence : float
         Log odds of the likeliest pattern that binds the free numbers of the causes, nats; NaN where none can be tested.
+    mounting_rotvec_rad : tuple of float
+        How the array was turned from upright in the first run, as a rotation vector, for the pictures.
     reference_clock : mapping
         Of a reference that was aligned before the diagnosis: ``offset_s`` (the channels' clock less the reference's at
         the first sample), ``rate_error`` (seconds of the channels' clock per second of the reference's, less one), and
@@ -226,6 +230,111 @@ class Diagnosis:
     library_probability: float = float("nan")
     coincidence: float = float("nan")
     reference_clock: Mapping[str, float] = field(default_factory=dict)
+    mounting_rotvec_rad: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """Return one row per parameter of each cause, units in the parameter's name; ``text`` of what is no number."""
+        rows = [(cause, key, value) for cause in self.causes for key, value in cause.parameters.items()]
+        numbers = [float(value) if _is_number(value) else np.nan for _, _, value in rows]
+        stds = [cause.std.get(key, np.nan) for cause, key, _ in rows]
+        texts = {
+            "effect": [cause.effect for cause, _, _ in rows],
+            "place": [cause.place for cause, _, _ in rows],
+            "parameter": [key for _, key, _ in rows],
+            "text": ["" if _is_number(value) else _in_words(value) for _, _, value in rows],
+        }
+        named = {key: np.array(values, dtype=object) for key, values in texts.items()}
+        return {
+            **{key: named[key] for key in ("effect", "place", "parameter")},
+            "value": np.array(numbers, dtype=float),
+            "std": np.array(stds, dtype=float),
+            "text": named["text"],
+            "probability": np.array([cause.probability for cause, _, _ in rows], dtype=float),
+        }
+
+    def _table_metadata(self) -> dict[str, Any]:
+        return {"verdict": self.verdict, "format_version": FORMAT_VERSION}
+
+    def _heading(self) -> str:
+        return f"Diagnosis: {self.verdict.replace('_', ' ')}{' (in part)' if self.in_part else ''}"
+
+    def _facts(self) -> list[tuple[str, str]]:
+        residual, gain = self.residual, self.gain
+        before_after = f"{residual.rms_before:.3g} m/s² before, {residual.rms_after:.3g} m/s² after"
+        facts = [("residual, rms", before_after), ("noise floor", f"{residual.noise_floor:.3g} m/s²")]
+        if np.isfinite(gain.share_of_excess_removed):
+            std = f" ± {100 * gain.share_std:.2g} %" if np.isfinite(gain.share_std) else ""
+            facts.append(
+                (f"removed on unseen data ({gain.held_out})", f"{100 * gain.share_of_excess_removed:.3g} %{std}")
+            )
+        if np.isfinite(self.library_probability):
+            facts.append(("probability that the library holds the cause", f"{100 * self.library_probability:.3g} %"))
+        return [*facts, ("runs", ", ".join(run.name for run in self.runs))]
+
+    def _notes(self) -> tuple[str, ...]:
+        return self.sentences
+
+    def _panels(self) -> list[Panel]:
+        channels = tuple(self.residual.before_by_channel)
+        by_channel = (
+            ("given simulation", self.residual.before_by_channel, "before"),
+            ("extended simulation", self.residual.after_by_channel, "after"),
+        )
+        sizes = tuple(
+            Series(name, np.array([found[channel] for channel in channels]), role=role)
+            for name, found, role in by_channel
+        )
+        panels = [Panel("residual of each channel", "rms, m/s²", sizes, channels, scale="zero")]
+        if self.runs and channels:
+            panels.append(self._worst_channel(channels))
+        return panels
+
+    def _worst_channel(self, channels: Sequence[str]) -> Panel:
+        """Return the residual over time of the channel that the given simulation predicts worst."""
+        worst = max(range(len(channels)), key=lambda place: self.residual.before_by_channel[channels[place]])
+        view = self.runs[0]
+        series = tuple(
+            Series(name, np.where(view.valid, view.measured - predicted, np.nan)[:, worst], role=role)
+            for name, predicted, role in (
+                ("given simulation", view.before, "before"),
+                ("extended simulation", view.after, "after"),
+            )
+        )
+        return Panel(f"measured less predicted, {channels[worst]}", "specific force, m/s²", series, view.t)
+
+    def report(self, folder: str | Path) -> Path:
+        """Write the folder of the diagnosis: verdict, extended twin, ``report.html`` and a rerun recording.
+
+        Parameters
+        ----------
+        folder : str or Path
+            Folder to write; made if it isn't there, in one that is.
+
+        Returns
+        -------
+        Path
+            The report, for a browser.
+
+        Raises
+        ------
+        InputError
+            If the folder can't be written.
+        """
+        import gfimu  # the report stands above the verdict
+
+        return gfimu.write_report(self, folder)
+
+    def to_rerun(self, path: str | Path) -> Path:
+        """Write measured and predicted channels and the rig in 3-D as a rerun recording, ``.rrd``.
+
+        Raises
+        ------
+        InputError
+            If the name does not end in ``.rrd``, or its folder can't be written to.
+        """
+        import gfimu  # the picture stands above the verdict
+
+        return gfimu.view(self, out=path)
 
     @property
     def in_part(self) -> bool:
@@ -301,6 +410,14 @@ class Diagnosis:
         folder = Path(directory)
         write_text(folder / "twin.toml", self.twin.to_toml())
         write_text(folder / "verdict.json", self.to_json())
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float | np.number) and not isinstance(value, bool)
+
+
+def _in_words(value: object) -> str:
+    return ", ".join(map(str, value)) if isinstance(value, list | tuple) else str(value)
 
 
 def _finite(value: Any) -> Any:

@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.errors import GfimuError, InputError
+from gfimu.errors import InputError
 from gfimu.files.input_file import MOST_COLUMNS, parsing
 from gfimu.importing.column_map import TextSpec
 from gfimu.importing.raw_table import RawFile, RawTable
+from gfimu.optional_packages import require
 
 __all__ = ["IMU_COLUMNS", "read_bag", "read_mcap", "read_ulog"]
 
-_NEEDS = "which is not installed: pip install 'gfimu[formats]'"
 _IMU = "sensor_msgs/msg/Imu"
 IMU_COLUMNS = (
     "stamp_ns",
@@ -35,10 +35,9 @@ _LEAST_READ = 512  # numerical: bytes that a call costs as much as
 
 def read_ulog(path: Path, text: TextSpec = TextSpec()) -> RawFile:
     """Read a ULog file: each topic and instance is a table, ``sensor_accel/0`` say."""
-    try:
-        from pyulog import ULog
-    except ImportError:
-        raise GfimuError(f"{path}: ULog needs pyulog, {_NEEDS}") from None
+    require(f"{path}: ULog", "pyulog")
+    from pyulog import ULog
+
     with parsing(path, "ULog file", "download it again"), contextlib.redirect_stdout(io.StringIO()):
         formats = ULog(_BoundedFile(path), parse_header_only=True).message_formats
         _check_fields(path, {name: one.fields for name, one in formats.items()})
@@ -88,11 +87,10 @@ def _check_fields(path: Path, formats: Mapping[str, Sequence[tuple[str, int, str
 
 def read_mcap(path: Path, text: TextSpec = TextSpec()) -> RawFile:
     """Read the topics with ``sensor_msgs/Imu`` of an MCAP file that ROS 2 wrote."""
-    try:
-        from mcap.reader import make_reader
-        from rosbags.typesys import Stores, get_typestore
-    except ImportError:
-        raise GfimuError(f"{path}: MCAP needs mcap and rosbags, {_NEEDS}") from None
+    require(f"{path}: MCAP", "mcap", "rosbags")
+    from mcap.reader import make_reader
+    from rosbags.typesys import Stores, get_typestore
+
     store = get_typestore(Stores.ROS2_HUMBLE)
     rows: dict[str, list[tuple[float, ...]]] = {}
     others: set[str] = set()
@@ -107,11 +105,10 @@ def read_mcap(path: Path, text: TextSpec = TextSpec()) -> RawFile:
 
 def read_bag(path: Path, text: TextSpec = TextSpec()) -> RawFile:
     """Read the topics with ``sensor_msgs/Imu`` of a ROS bag: a ROS 1 file, or a folder of ROS 2."""
-    try:
-        from rosbags.highlevel import AnyReader
-        from rosbags.typesys import Stores, get_typestore
-    except ImportError:
-        raise GfimuError(f"{path}: a ROS bag needs rosbags, {_NEEDS}") from None
+    require(f"{path}: a ROS bag", "rosbags")
+    from rosbags.highlevel import AnyReader
+    from rosbags.typesys import Stores, get_typestore
+
     rows: dict[str, list[tuple[float, ...]]] = {}
     folder = path.parent if path.suffix == ".db3" else path
     store = get_typestore(Stores.ROS1_NOETIC if path.suffix == ".bag" else Stores.ROS2_HUMBLE)

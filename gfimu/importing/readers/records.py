@@ -13,11 +13,12 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from gfimu.errors import GfimuError, InputError
+from gfimu.errors import InputError
 from gfimu.files.input_file import parsing, read_bytes
 from gfimu.importing.column_map import TextSpec
 from gfimu.importing.raw_table import RawFile, RawTable
 from gfimu.importing.readers.text import cell_values, table_of_text
+from gfimu.optional_packages import require
 
 __all__ = ["is_workbook", "read_excel", "read_json"]
 
@@ -162,13 +163,9 @@ def is_workbook(path: Path) -> bool:
 
 def read_excel(path: Path, text: TextSpec = TextSpec()) -> RawFile:
     """Read the sheets of an Excel workbook (xlsx), each as a table."""
-    try:
-        import openpyxl
-    except ImportError:
-        raise GfimuError(
-            f"{path}: an Excel workbook needs openpyxl, which is not installed: pip install 'gfimu[formats]'; or save "
-            "the sheet as CSV"
-        ) from None
+    require(f"{path}: an Excel workbook", "openpyxl", instead="save the sheet as CSV")
+    import openpyxl
+
     tables: dict[str, RawTable] = {}
     with parsing(path, "workbook", "save the sheet as CSV"):
         book = openpyxl.load_workbook(path, read_only=True, data_only=True)

@@ -13,11 +13,12 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from gfimu.errors import GfimuError, InputError
+from gfimu.errors import InputError
 from gfimu.files.input_file import parsing
 from gfimu.importing.column_map import TextSpec
 from gfimu.importing.raw_table import RawFile, RawTable
 from gfimu.importing.readers.text import table_of_text
+from gfimu.optional_packages import require
 
 __all__ = ["arrow_table", "gather", "read_archive", "read_hdf5", "read_parquet", "tables_by_length"]
 
@@ -71,10 +72,9 @@ def _member(data: bytes, path: Path, name: str, text: TextSpec) -> RawTable | No
 
 def read_hdf5(path: Path, text: TextSpec = TextSpec()) -> RawFile:
     """Read the data sets of an HDF5 file; those of equal length are one table."""
-    try:
-        import h5py
-    except ImportError:
-        raise GfimuError(f"{path}: HDF5 needs h5py, which is not installed: pip install 'gfimu[formats]'") from None
+    require(f"{path}: HDF5", "h5py")
+    import h5py
+
     found: dict[str, NDArray[Any]] = {}
 
     def take(name: str, item: Any) -> None:

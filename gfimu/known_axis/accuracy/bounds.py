@@ -18,6 +18,7 @@ from gfimu.errors import GeometryError
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.geometry.turning_axis import TurningAxis
 from gfimu.known_axis.channels import AxisChannels
+from gfimu.results import Panel, PlottedResult, Series, result_html, text_column
 
 if TYPE_CHECKING:
     from gfimu.known_axis.accuracy.predicted import PredictedEstimate
@@ -26,7 +27,7 @@ __all__ = ["AxisBounds", "axis_bounds", "require_visible"]
 
 
 @dataclass(frozen=True)
-class AxisBounds:
+class AxisBounds(PlottedResult):
     """Bounds on a rotation about one axis.
 
     Parameters
@@ -53,6 +54,38 @@ class AxisBounds:
     sample_std: float
     filter_std: float
     predicted: PredictedEstimate | None = None
+
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """Return the bounds as one row, units in the names."""
+        numbers = {
+            "rate_rad_s": self.rate_rad_s,
+            "sigma_alpha_rad_s2": self.acceleration_std,
+            "sigma_rate_squared_rad2_s2": self.square_std,
+            "sigma_rate_sample_rad_s": self.sample_std,
+            "sigma_rate_filter_rad_s": self.filter_std,
+        }
+        return {"array": text_column([self.array])} | {key: np.array([one]) for key, one in numbers.items()}
+
+    def _heading(self) -> str:
+        return f"Score of {self.array} about its axis"
+
+    def _facts(self) -> list[tuple[str, str]]:
+        return [
+            ("axis", f"({', '.join(f'{one:g}' for one in self.axis.direction)}), {self.axis.hub} hub"),
+            ("rate", f"{self.rate_rad_s:.4g} rad/s"),
+            ("σ of the acceleration, one sample", f"{self.acceleration_std:.3g} rad/s²"),
+            ("σ of the rate, one sample", f"{self.sample_std:.3g} rad/s"),
+            ("σ of the rate, filter that has settled", f"{self.filter_std:.3g} rad/s"),
+        ]
+
+    def _repr_html_(self) -> str:
+        return result_html(self._heading(), self._facts(), None)
+
+    def _panels(self) -> list[Panel]:
+        values = np.array([self.sample_std, self.filter_std])
+        series = Series("", np.where(np.isfinite(values), values, np.nan))
+        title = f"bounds on the rate at {self.rate_rad_s:.3g} rad/s"
+        return [Panel(title, "σ of the rate, rad/s", (series,), ("one sample", "filter, settled"), scale="zero")]
 
     def to_dict(self) -> dict[str, Any]:
         """Return the bounds as JSON holds them."""

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
@@ -19,6 +20,7 @@ from gfimu.known_axis.accuracy.bounds import require_visible
 from gfimu.known_axis.accuracy.predicted_readings import gravity_of, readings_of
 from gfimu.known_axis.channels import AxisChannels
 from gfimu.known_axis.recursion import Slopes, filter_axis
+from gfimu.results import Panel, PlottedResult, Series, text_column
 
 __all__ = ["AxisDrift", "AxisDriftTerm", "axis_drift"]
 
@@ -46,7 +48,7 @@ class AxisDriftTerm:
 
 
 @dataclass(frozen=True)
-class AxisDrift:
+class AxisDrift(PlottedResult):
     """Drift about a known axis.
 
     Parameters
@@ -69,6 +71,36 @@ class AxisDrift:
     rate_rad_s: float
     terms: tuple[AxisDriftTerm, ...]
     remark: str
+
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """Return one row per cause: its size, and the standard deviations of rate and angle at the end."""
+        return {
+            "cause": text_column(one.name for one in self.terms),
+            "size": text_column(one.size for one in self.terms),
+            "rate_std_rad_s": np.array([one.rate_std for one in self.terms]),
+            "angle_std_rad": np.array([one.angle_std for one in self.terms]),
+        }
+
+    def _heading(self) -> str:
+        return f"Drift of {self.array} about its axis after {self.time_s:g} s at {self.rate_rad_s:.3g} rad/s"
+
+    def _facts(self) -> list[tuple[str, str]]:
+        rate, angle = self.total
+        return [("rate, σ", f"{rate:.3g} rad/s"), ("angle, σ", f"{angle:.3g} rad")]
+
+    def _notes(self) -> tuple[str, ...]:
+        return (self.remark,) if self.remark else ()
+
+    def _panels(self) -> list[Panel]:
+        columns, total = self.to_columns(), self.total
+        names = (*(one.name for one in self.terms), "total")
+        return [
+            Panel(title, label, (Series("", np.append(columns[key], whole)),), names, scale="zero")
+            for title, label, key, whole in (
+                ("rate error at the end, by cause", "σ, rad/s", "rate_std_rad_s", total[0]),
+                ("angle error at the end, by cause", "σ, rad", "angle_std_rad", total[1]),
+            )
+        ]
 
     @property
     def total(self) -> tuple[float, float]:

@@ -1,18 +1,23 @@
 """What an array is drawn as: its package, chips with names and axes, the axis of rotation, gravity, a table below."""
 
+from typing import TYPE_CHECKING
+
+from gfimu.lazy_names import names_on_first_use
 from gfimu.visual.rig.package import Package, drawing_size, is_cube, package_of, stand_height
-from gfimu.visual.rig.shapes import (
-    array_shapes,
-    axes_shapes,
-    axis_shapes,
-    channel_shapes,
-    chip_names,
-    ghost_shapes,
-    gravity_shapes,
-    post_shapes,
-    table_axis_shapes,
-    table_shapes,
-)
+
+if TYPE_CHECKING:
+    from gfimu.visual.rig.shapes import (
+        array_shapes,
+        axes_shapes,
+        axis_shapes,
+        channel_shapes,
+        chip_names,
+        ghost_shapes,
+        gravity_shapes,
+        post_shapes,
+        table_axis_shapes,
+        table_shapes,
+    )
 
 __all__ = [
     "Package",
@@ -31,3 +36,24 @@ __all__ = [
     "table_axis_shapes",
     "table_shapes",
 ]
+
+if not TYPE_CHECKING:  # a package is measured where rerun is not installed
+    __getattr__ = names_on_first_use(
+        __name__,
+        dict.fromkeys(
+            (
+                "array_shapes",
+                "axes_shapes",
+                "axis_shapes",
+                "channel_shapes",
+                "chip_names",
+                "ghost_shapes",
+                "gravity_shapes",
+                "post_shapes",
+                "table_axis_shapes",
+                "table_shapes",
+            ),
+            "shapes",
+        ),
+        needs=("a rerun recording", "rerun"),
+    )

@@ -235,7 +235,7 @@ def test_a_recording_states_the_rate_of_its_time_stamps(feed, tmp_path) -> None:
     assert stated["host_clock_rate_hz"] == pytest.approx(
         stated["time_stamp_rate_hz"] / (1 + stated["host_clock"]["rate_error"])
     )
-    clock = ClockFit(**stated["host_clock"])  # as docs/firmware.md says
+    clock = ClockFit(**stated["host_clock"])  # as docs/reference/firmware.md says
     assert clock.to_host(clock.mean_board_s) == pytest.approx(clock.mean_board_s + clock.offset_s)
 
 

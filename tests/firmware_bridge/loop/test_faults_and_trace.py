@@ -106,7 +106,7 @@ def test_a_fault_of_the_firmware_crosses_the_process(tmp_path) -> None:
 
 
 def test_without_the_extra_the_message_says_what_to_install(monkeypatch) -> None:
-    monkeypatch.setattr(board_process, "emulator_available", lambda: False)
+    monkeypatch.setitem(sys.modules, "unicorn", None)  # as if it were not installed
     with pytest.raises(InputError, match=r"pip install 'gfimu\[firmware\]'"):
         board_process.BoardProcess()
 

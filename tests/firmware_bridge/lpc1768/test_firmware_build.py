@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import struct
+import sys
 import tomllib
 
 import pytest
@@ -89,7 +90,7 @@ def test_errors_name_the_remedy(tmp_path, monkeypatch) -> None:
         ElfImage.parse(image_path().read_bytes()[:60], "cut.elf")
     with pytest.raises(InputError, match=r"missing\.elf"):
         ElfImage.load(tmp_path / "missing.elf")
-    monkeypatch.setattr(firmware.importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setitem(sys.modules, "ziglang", None)  # as if it were not installed
     with pytest.raises(InputError, match=r"pip install 'gfimu\[firmware\]'"):
         build("gfimu", tmp_path)
 

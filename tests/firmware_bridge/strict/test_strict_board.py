@@ -24,7 +24,7 @@ from firmware_bridge.strict.worker import run_board
 from gfimu.errors import InputError
 
 IMAGES = Path(__file__).parents[1] / "images"
-DOCS = Path(__file__).parents[3] / "docs" / "firmware.md"
+DOCS = Path(__file__).parents[3] / "docs" / "reference" / "firmware.md"
 LIMIT_S = 30.0
 FLASH_ONLY = {"boot_checksum"}  # the tests' compiler writes none
 

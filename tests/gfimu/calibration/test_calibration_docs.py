@@ -1,4 +1,4 @@
-"""The scripts behind docs/calibration.md and docs/noise.md, and that the pages quote what they find."""
+"""The scripts behind docs/how_to/calibration.md and docs/theory/noise.md, and that the pages quote what they find."""
 
 import importlib.util
 import re
@@ -9,7 +9,7 @@ import pytest
 
 
 def load(project_root, name):
-    specification = importlib.util.spec_from_file_location(name, project_root / "docs" / f"{name}.py")
+    specification = importlib.util.spec_from_file_location(name, project_root / "docs" / "scripts" / f"{name}.py")
     module = importlib.util.module_from_spec(specification)
     sys.modules[specification.name] = module
     specification.loader.exec_module(module)
@@ -18,7 +18,7 @@ def load(project_root, name):
 
 @pytest.fixture(scope="module")
 def page(project_root):
-    return (project_root / "docs" / "calibration.md").read_text(encoding="utf-8")
+    return (project_root / "docs" / "how_to" / "calibration.md").read_text(encoding="utf-8")
 
 
 def test_what_holds_of_the_persian_papers_ranking(project_root, tmp_path):

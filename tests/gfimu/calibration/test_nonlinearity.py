@@ -20,7 +20,7 @@ from sim.adxl345 import SensorSettings
 
 @pytest.fixture(scope="module")
 def study(project_root):
-    path = project_root / "docs" / "calibration_consistency.py"
+    path = project_root / "docs" / "scripts" / "calibration_consistency.py"
     spec = importlib.util.spec_from_file_location("calibration_consistency", path)
     module = importlib.util.module_from_spec(spec)
     sys.modules["calibration_consistency"] = module
@@ -134,7 +134,7 @@ def test_a_factor_learned_elsewhere_is_used():
 
 @pytest.mark.parametrize("case", [("array", "cube12", None), ("six-position", "cube12", 12)])
 def test_standard_deviations_hold_on_simulated_parts(study, case):
-    """A few runs of docs/calibration_consistency.py: without the bend in the model, biases are 2 to 3 std off."""
+    """A few runs of docs/scripts/calibration_consistency.py: without the bend in the model, biases are 2 to 3 σ off."""
     method, name, parameters = case
     poses = study.Poses.of(AccelerometerArray.load(name), "faces" if method == "six-position" else "faces_edges")
     errors = study.normalised_errors(method, poses, parameters, 6, seed=7)

@@ -169,7 +169,9 @@ def test_the_file_reads_back_and_fits_the_published_schema(calibration, tmp_path
 
 
 def test_the_published_schema_is_that_of_the_dataclasses():
-    assert SCHEMA_FILE.read_text(encoding="utf-8") == certificate_schema(), "run: python docs/make_files_reference.py"
+    assert SCHEMA_FILE.read_text(encoding="utf-8") == certificate_schema(), (
+        "run: python docs/scripts/make_files_reference.py"
+    )
 
 
 def test_every_key_of_the_schema_has_a_meaning():

@@ -81,7 +81,7 @@ def test_score_and_optimize(tmp_path):
 
 
 def test_drift_with_a_monte_carlo():
-    found = gfimu.drift("cube12", time=0.3, bias_mg=35.0, monte_carlo=20)
+    found = gfimu.drift("cube12", duration=0.3, bias_mg=35.0, monte_carlo=20)
     assert found.sample is not None
     assert found.to_dict()["monte_carlo"]["runs"] == 20
     assert gfimu.drift(gfimu.AccelerometerArray.load("cube12"), noise_ug=290.0).sample is None

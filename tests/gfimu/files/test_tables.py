@@ -1,6 +1,6 @@
 """Data objects: recordings and estimates to pandas, polars and pyarrow and back, with the checks of a file."""
 
-import builtins
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -169,13 +169,6 @@ def test_what_is_no_table_is_refused_in_one_line():
 
 
 def test_without_pandas_the_remedy_is_named(run, monkeypatch):
-    usual = builtins.__import__
-
-    def without(name, *arguments, **more):
-        if name == "pandas":
-            raise ImportError(name)
-        return usual(name, *arguments, **more)
-
-    monkeypatch.setattr(builtins, "__import__", without)
+    monkeypatch.setitem(sys.modules, "pandas", None)  # as if it were not installed
     with pytest.raises(GfimuError, match=r"to_pandas needs pandas.*pip install 'gfimu\[tables\]'"):
         run.to_pandas()

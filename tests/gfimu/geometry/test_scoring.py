@@ -190,7 +190,7 @@ def test_turning_the_body_changes_no_gdop(seed):
 
 
 def test_no_quadruple_in_the_cube_beats_the_tetrahedron():
-    # Bound of docs/geometry.md: GDOP² ≥ 9/24 + 3/4 = 9/8 for four tri-axial chips inside [−1, 1]³.
+    # Bound of docs/theory/geometry.md: GDOP² ≥ 9/24 + 3/4 = 9/8 for four tri-axial chips inside [−1, 1]³.
     assert gdop_lower_bound(4) == pytest.approx(math.sqrt(9 / 8))
     rng = np.random.default_rng(0)
     random = gdop(rng.uniform(-1, 1, (100_000, 4, 3)))
@@ -269,7 +269,7 @@ def test_kappa_of_p1_and_p2_is_below_the_cubes():
 def test_table_in_the_docs_is_what_the_code_computes(project_root):
     rows = [
         [cell.strip() for cell in line.strip("| \n").split("|")]
-        for line in (project_root / "docs" / "geometry.md").read_text(encoding="utf-8").splitlines()
+        for line in (project_root / "docs" / "theory" / "geometry.md").read_text(encoding="utf-8").splitlines()
         if line.startswith("| `") and line.count("|") == 8  # other tables of the page are narrower
     ]
     assert {row[0].strip("`") for row in rows} == set(seeing_arrays())

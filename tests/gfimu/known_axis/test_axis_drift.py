@@ -70,7 +70,8 @@ def test_white_noise_does_what_the_drift_says():
 
 
 def test_the_command_s_function_takes_an_axis_for_few_chips():
-    found = gfimu.axis_drift("one_chip", axis="z", axis_point=(-0.1, 0.0, 0.0), time=60.0, rate=6.0, bias_mg=5.0)
+    how = {"duration": 60.0, "speed_rad_s": 6.0, "bias_mg": 5.0}
+    found = gfimu.axis_drift("one_chip", axis="z", axis_point=(-0.1, 0.0, 0.0), **how)
     assert found.to_dict()["angle_std_rad"] == pytest.approx(0.0490 / (2.0 * 6.0 * 0.1) * 60.0, rel=0.03)
     with pytest.raises(GeometryError):
         gfimu.drift("one_chip", bias_mg=5.0)

@@ -123,10 +123,10 @@ def test_a_rest_with_missing_samples_gives_no_window():
     ("options", "words"),
     [
         ({"time": 500.0}, "no complete rest of 510 s .* the longest is 2"),
-        ({"time": 0.0}, "--time is 0 s"),
+        ({"time": 0.0}, "--duration is 0 s"),
         ({"lead": -1.0}, "--lead is -1 s"),
-        ({"time": float("nan")}, "--time is nan s"),
-        ({"time": 1e308}, "--time is 1e"),
+        ({"time": float("nan")}, "--duration is nan s"),
+        ({"time": 1e308}, "--duration is 1e"),
         ({"gravity": float("inf")}, "gravity is inf"),
     ],
 )
@@ -138,7 +138,7 @@ def test_what_cannot_be_done_is_refused(options, words):
 def test_eight_chips_in_the_hand_drift_as_their_noise_says(shared_data):
     """MIMU4444, some twenty poses; after 1 s the tilt is still small. The first window is just after power-on."""
     file = shared_data / "mimu4444" / "exp_1.bin.gz"
-    found = gfimu.drift_of_rest(file, "mimu4444", time=1.0, lead=5.0)
+    found = gfimu.drift_of_rest(file, "mimu4444", duration=1.0, lead=5.0)
     low, high = found.ratio_interval
     assert found.valid
     assert len(found.start_s) > 50

@@ -199,7 +199,7 @@ def test_what_differs_between_two_arrays():
 
 
 def test_the_documented_part_file_is_enough(project_root, tmp_path):
-    text = (project_root / "docs" / "recording-format.md").read_text(encoding="utf-8")
+    text = (project_root / "docs" / "reference" / "recording-format.md").read_text(encoding="utf-8")
     block = text.split("## Part\n")[1].split("```toml\n")[1].split("```")[0]
     (tmp_path / "my_chip.toml").write_text(block, encoding="utf-8")
     array = AccelerometerArray.load(own_array(tmp_path / "own", part="../my_chip.toml"))

@@ -55,7 +55,7 @@ def test_at_rest_nothing_shows() -> None:
 )
 def test_the_three_poses_of_the_bench_page(name: str, table, project_root) -> None:
     """Of +x, +y and +z up: what each chip reads, as the page has it."""
-    page = (project_root / "docs" / "bench.md").read_text(encoding="utf-8")
+    page = (project_root / "docs" / "how_to" / "bench.md").read_text(encoding="utf-8")
     rows = {line.split(" | ")[0]: line.strip("| ").split(" | ") for line in page.splitlines() if line.startswith("| +")}
     column = 1 + list(ARRAYS).index(name)
     for up, expected, label in zip(np.eye(3), table, "xyz", strict=True):

@@ -34,7 +34,7 @@ def budget_of(name, calibration, tolerances=None, **changes):
 
 
 def test_bias_of_the_cube_by_hand():
-    """S of the cube has rows of two entries ±1/(4h)·… : σ_α = b/(√8 h), h = 5 cm (docs/geometry.md)."""
+    """S of the cube has rows of two entries ±1/(4h)·… : σ_α = b/(√8 h), h = 5 cm (docs/theory/geometry.md)."""
     found = budget_of("cube12", "none", only(run_of("cube12").array, "bias")).quantities["alpha"]
     assert found.rms == pytest.approx(math.sqrt(3.0) * 0.3 / (math.sqrt(8.0) * 0.05))
 

@@ -1,4 +1,4 @@
-"""The figures of docs/tolerance.md are those of the commands that it names."""
+"""The figures of docs/how_to/tolerance.md are those of the commands that it names."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from gfimu.tolerances.words import pay_for, room_for
 
 @pytest.fixture(scope="module")
 def page(project_root):
-    return (project_root / "docs" / "tolerance.md").read_text(encoding="utf-8")
+    return (project_root / "docs" / "how_to" / "tolerance.md").read_text(encoding="utf-8")
 
 
 @pytest.fixture(scope="module")
 def cube():
     return {
         "ADXL345": gfimu.tolerance("cube12", closed_form=True).budgets,
-        "ADXL355": gfimu.tolerance("cube12", closed_form=True, part="adxl355", rate=10.0).budgets,
+        "ADXL355": gfimu.tolerance("cube12", closed_form=True, part="adxl355", speed_rad_s=10.0).budgets,
     }
 
 

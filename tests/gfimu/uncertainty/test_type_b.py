@@ -53,7 +53,7 @@ def test_levelling_of_each_face_spreads_the_six_position_parameters_as_theory_sa
     np.testing.assert_allclose(standard[:9][~OFF_DIAGONAL], np.sqrt(24.0) / 4.0 * std**2, rtol=2.0 * allowed)
 
 
-# Largest over the axes, per unit of the stage error: δ, b over g, angle between sensing axes; docs/stage.md.
+# Largest over the axes, per unit of the stage error: δ, b over g, angle between sensing axes; docs/how_to/stage.md.
 SIX_FACES = {
     "pose_tilt": (np.sqrt(0.5), 1.0 / 3.0, 1.0),
     "base_tilt": (1.0, 2.0 / 3.0, 1.0),

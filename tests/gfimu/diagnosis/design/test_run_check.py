@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gfimu.diagnosis.design.run_check import check_runs
+from gfimu.diagnosis.design.run_check import check_runs, turns_one_way
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
@@ -70,3 +70,9 @@ def test_a_run_without_its_reference_is_refused(run):
     bare = Recording.from_arrays(run.t_s, run.readings, TWIN.array)
     with pytest.raises(InputError, match="tacho"):
         check_runs([bare], TWIN, ["bare"])
+
+
+def test_turning_back_takes_no_turns_away():
+    t = np.linspace(0.0, 20.0, 2001)
+    rate = np.where(t < 10.0, 2.0 * np.pi, -2.0 * np.pi)
+    assert turns_one_way(rate, t) == pytest.approx(10.0, abs=0.02)

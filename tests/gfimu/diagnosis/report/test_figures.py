@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import io
 import re
 from dataclasses import replace
 from xml.etree import ElementTree as ET
@@ -9,6 +11,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pytest
 from made_runs import PERIOD, made_view
+from PIL import Image
 
 from gfimu.diagnosis.criticism.views.residuals import residual_views
 from gfimu.diagnosis.report import figures
@@ -41,7 +44,8 @@ def texts(svg):
 def drawn(views, view):
     dependence = views.by_view("rate squared")
     return {
-        "before_after": figures.before_after_figure(view, views.size),
+        "trace": figures.trace_figure(view, views.size),
+        "bars": figures.bars_figure(views.size),
         "channels": figures.channels_figure(view, views.size, ARRAY),
         "dependence": figures.dependence_figure(dependence, ARRAY),
         "spectrum": figures.spectrum_figure(views.spectrum),
@@ -55,7 +59,8 @@ def test_every_figure_is_well_formed_labelled_and_the_same_each_time(views, view
     first = drawn(views, view)
     assert first["spectrum"] == figures.spectrum_figure(views.spectrum)
     labels = {
-        "before_after": {"measured − predicted, channel a11", "time, s", "m/s²", *CHANNELS},
+        "trace": {"measured − predicted, channel a11", "time, s", "m/s²"},
+        "bars": {"rms per channel", "m/s²", *CHANNELS},
         "channels": {*CHANNELS, "time, s"},
         "dependence": {"ω², rad²/s²", "mean residual, m/s²", "a11"},
         "spectrum": {"frequency, Hz", "amplitude density, m/s²/√Hz", "before", "after", "noise"},
@@ -72,12 +77,28 @@ def test_every_figure_is_well_formed_labelled_and_the_same_each_time(views, view
 
 def test_before_after_and_the_chips_have_their_colours_in_every_figure(views, view):
     found = drawn(views, view)
-    for name in ("before_after", "spectrum"):
+    for name in ("trace", "bars", "spectrum"):
         assert css(BEFORE_ON_PAPER) in found[name]
         assert css(AFTER_ON_PAPER) in found[name]
     for name in ("channels", "dependence", "rig"):
         for chip in range(2):
             assert css(chip_colour(chip, on_paper=True)) in found[name], name
+
+
+def test_a_figure_takes_the_colours_of_the_page(views, view):
+    svg = figures.themed(drawn(views, view)["dependence"], 2)
+    assert {"var(--chip-0)", "var(--chip-1)", "var(--ink)", "var(--noise)", "var(--card)"} <= set(
+        re.findall(r"var\([^)]+\)", svg)
+    )
+    assert not re.search(r"#[0-9a-f]{6}\b", svg)
+    ET.fromstring(svg)
+
+
+def test_samples_are_one_picture_of_few_colours(views, view):
+    pictures = re.findall(r"base64,([^\"]+)", figures.trace_figure(view, views.size))
+    assert len(pictures) == 1
+    image = Image.open(io.BytesIO(base64.b64decode(pictures[0])))
+    assert image.mode == "P"
 
 
 def test_gravity_and_axis_follow_the_mounting_and_a_free_body_has_no_table(view):

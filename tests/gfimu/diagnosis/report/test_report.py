@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import html
 import re
-from dataclasses import replace
+from dataclasses import fields, replace
 from html.parser import HTMLParser
 from xml.etree import ElementTree as ET
 
@@ -72,7 +74,7 @@ def pages(made_once):
 
 
 def words_of(page: str) -> str:
-    text = re.sub(r"<style>.*?</style>|<svg.*?</svg>", "", page, flags=re.DOTALL)
+    text = re.sub(r"<style>.*?</style>|<script.*?</script>|<!--.*?-->|<svg.*?</svg>", "", page, flags=re.DOTALL)
     return re.sub(r"\s+", " ", html.unescape(re.sub(r"<[^>]+>", " ", text)))
 
 
@@ -83,14 +85,30 @@ def test_the_page_is_whole_and_needs_no_network(pages, verdict):
     assert page.open == []
     assert page.links
     assert all(link.startswith(("#", "data:")) for link in page.links)
-    assert not re.search(r"url\((?!#)|@import|<script", pages[verdict])
-    assert len(pages[verdict].encode()) < 3_000_000
+    assert not re.search(r"url\((?!#)|@import|<script[^>]*src", pages[verdict])
+    assert len(pages[verdict].encode()) < 1_000_000
+
+
+def test_no_script_runs_but_those_of_the_page(pages):
+    """The page's own policy names its two scripts by their content, and lets nothing be loaded."""
+    page = pages["unknown"]
+    (policy,) = re.findall(r'http-equiv="Content-Security-Policy" content="([^"]+)"', page)
+    policy = html.unescape(policy)
+    assert policy.startswith("default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src ")
+    scripts = re.findall(r"<script>(.*?)</script>", page, flags=re.DOTALL)
+    hashes = [base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in scripts]
+    assert len(scripts) == 2
+    assert policy.rpartition("script-src ")[2] == " ".join(f"'sha256-{one}'" for one in hashes)
+
+
+def test_the_licence_of_the_plots_is_on_the_page(pages):
+    assert "Copyright (c) 2022 Leon Sorokin" in pages["explained"]
 
 
 @pytest.mark.parametrize("verdict", VERDICTS)
 def test_every_figure_is_a_picture_of_its_own(pages, verdict):
     figures = re.findall(r"<svg.*?</svg>", pages[verdict], flags=re.DOTALL)
-    assert len(figures) >= 11  # before/after, fingerprint, nine or more views, all channels
+    assert len(figures) >= 13  # trace, bars, array, fingerprint, eight or more views, all channels
     for figure in figures:
         ET.fromstring(figure)
     names = re.findall(r'\bid="([^"]+)"', pages[verdict])
@@ -144,8 +162,8 @@ def test_noise_levels_have_their_units(pages):
 
 
 def test_text_from_outside_cannot_break_the_page(pages):
-    assert "<script" not in pages["unknown"]
-    assert "&lt;script&gt;" in pages["unknown"]
+    assert "<script>alert" not in pages["unknown"]
+    assert "&lt;script&gt;alert" in pages["unknown"]
 
 
 def test_a_dead_channel_is_named(pages):
@@ -158,10 +176,10 @@ def test_the_folder_holds_all_files_or_none(tmp_path, monkeypatch):
     (tmp_path / "out" / "verdict.json").write_text("kept")
     written_report = []  # drawing it takes seconds, and the pages above are of it
     monkeypatch.setattr(
-        "gfimu.diagnosis.report.folder.write_report", lambda path, *_: written_report.append(path.write_text("report"))
+        "gfimu.diagnosis.report.page.write_report", lambda path, *_: written_report.append(path.write_text("report"))
     )
     with monkeypatch.context() as patch:
-        patch.setattr("gfimu.diagnosis.report.folder.write_picture", lambda *_, **__: 1 / 0)
+        patch.setattr("gfimu.diagnosis.report.picture.write_picture", lambda *_, **__: 1 / 0)
         with pytest.raises(ZeroDivisionError):
             write_diagnosis(tmp_path / "out", diagnosis)
     assert [file.name for file in (tmp_path / "out").iterdir()] == ["verdict.json"]
@@ -228,6 +246,19 @@ def test_several_causes_are_counted_and_named():
     assert headline(both).startswith("Found two things that the simulation leaves out: ")
     assert "these put into the simulation" in story(both)
     assert any("confounded with sensor_position" in step for step in next_steps(both))
+
+
+def test_a_run_of_one_sample_leaves_the_words():
+    diagnosis = made_diagnosis("nothing_found")
+    (run,) = diagnosis.runs
+    first = {
+        item.name: value[:1]
+        for item in fields(run)
+        if isinstance(value := getattr(run, item.name), np.ndarray) and item.name != "white"
+    }
+    words = words_of(report_html(replace(diagnosis, runs=(replace(run, **first),))))
+    assert "Nothing is wrong with the simulation that this recording could show." in words
+    assert "What the residual shows" in words
 
 
 def test_the_page_of_a_linear_axis_has_speeds_in_metres():

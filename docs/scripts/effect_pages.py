@@ -1,0 +1,355 @@
+"""The pages of the catalogue of effects: text in MyST Markdown from an effect's class and its stored numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from effect_formulas import BY_CHANCE, TOLERANCE, to_latex, vectors_of
+
+from gfimu.diagnosis.design.proposal import SEPARATED
+from gfimu.diagnosis.policy import Policy
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.units import NAME, NUMBER, RATIO
+from sim.effects import BODY_EFFECTS, CARRIAGE_EFFECTS, FURTHER_EFFECTS, TABLE_EFFECTS
+from sim.effects.base import Effect
+from sim.effects.catalogue import PLACES, every_effect, place_of
+from sim.effects.description import Description, describe
+from sim.effects.unlisted import Unlisted
+
+__all__ = ["EXPERIMENTS", "index_page", "page"]
+
+EXPERIMENTS = {
+    "sweep": "speed sweep",
+    "sweep + side": "sweep upright and on its side",
+    "sweep + poses": "sweep and 18 poses at rest",
+    "sweep + heated rest": "sweep and a rest warmed by 10 K",
+    "all": "all of these",
+    "tumble": "tumble",
+    "hand": "in the hand",
+    "tumble + hand": "tumble and in the hand",
+    "strokes": "strokes",
+    "strokes + side": "strokes upright and on its side",
+}
+"""Words for the experiments of `effect_rivals`."""
+
+_UNITS = {RATIO: "1", NUMBER: "number", NAME: "name"}
+_ANY = Policy().seen
+
+
+def page(effect: type[Effect], numbers: Mapping[str, Any]) -> str:
+    """Return the page of an effect."""
+    text = describe(effect)
+    parts = [
+        f"# {effect.name}",
+        f"**{_sentence(text.title)}** {text.what}",
+        _where(effect),
+        "## Parameters",
+        _parameters(effect, text),
+        "## Mathematics",
+        _mathematics(effect, text),
+        "## Signature",
+        _signature(effect, text, numbers["signature"]),
+        "## Rivals",
+        _rivals(numbers),
+        "## How to separate it",
+        _separation(text, numbers),
+        "## In real data",
+        text.recordings or "No recording with it is at hand.",
+        "## Hide it, and find it",
+        _trial(effect, text, numbers.get("trial")),
+    ]
+    rail = CARRIAGE_EFFECTS.get(effect.name)
+    if rail is not None and rail is not effect:
+        parts += ["## On a linear axis", _on_rail(rail)]
+    return "\n\n".join(parts) + "\n"
+
+
+def index_page(effects: Mapping[str, type[Effect]], numbers: Mapping[str, Any]) -> str:
+    """Return the table of all effects, by place in the chain."""
+    parts = [
+        "# Catalogue of effects",
+        _INTRODUCTION,
+    ]
+    for place, words in PLACES.items():
+        mine = [effect for effect in effects.values() if place_of(effect) == place]
+        if not mine:
+            continue
+        rows = ["| effect | what is so in the world and missing in the simulation | formula | not separable in a sweep from |"]
+        rows.append("|---|---|---|---|")
+        for effect in mine:
+            sweep = numbers[effect.name]["motions"].get("speed sweep", {"rivals": []})
+            rivals = [rival for rival, _, nats in sweep["rivals"] if nats < SEPARATED]
+            formula = _inline(describe(effect))
+            rows.append(f"| {_link(effect.name)} | {effect.summary} | {formula} | {', '.join(map(_link, rivals))} |")
+        parts += [f"## {place.capitalize()}: {words}", "\n".join(rows)]
+    names = "\n".join(effects)
+    parts += ["## Your own effects", _OWN, f"```{{toctree}}\n:hidden:\n:maxdepth: 1\n\n{names}\n```"]
+    return "\n\n".join(parts) + "\n"
+
+
+_INTRODUCTION = f"""\
+One page per effect that a simulated rig can have and a diagnosis can name: what it is, its formula, what it changes in a
+run, which effects it is confounded with in which motion, and the experiment that separates them. `gfimu list effects` lists
+them; `gfimu show table_tilt` prints the essence of a page.
+
+The chain is: geometry and gravity → motion → sensing → sampling → data. The reading of an ideal sensor whose axis is
+$\\boldsymbol{{a}}$, at the place $\\boldsymbol{{r}}$ from the table's axis $\\boldsymbol{{z}}$, is the specific force there along it:
+
+$$
+f = \\boldsymbol{{a}} \\cdot \\boldsymbol{{F}}, \\qquad
+\\boldsymbol{{F}} = g\\,\\boldsymbol{{u}} + \\alpha\\,\\boldsymbol{{z}} \\times \\boldsymbol{{r}}
++ \\omega^2\\,\\boldsymbol{{z}} \\times (\\boldsymbol{{z}} \\times \\boldsymbol{{r}})
+$$
+
+| symbol | meaning | unit |
+|---|---|---|
+| $f$, $y$ | reading of a channel before and after the effect; an index is a channel | m/s² |
+| $\\theta$, $\\omega$, $\\alpha$ | angle, rate and angular acceleration of the table | rad, rad/s, rad/s² |
+| $\\Omega$, $\\Omega'$ | reading of the reference before and after the effect; of a free body the three of the gyro | rad/s |
+| $\\boldsymbol{{u}}$, $g$ | up, in the table's frame; local gravity | 1, m/s² |
+| $R_z(\\theta)$ | rotation by the angle $\\theta$ about $\\boldsymbol{{z}}$ | |
+| $\\boldsymbol{{\\rho}}$ | place of a chip from the cube's centre | m |
+| $t$, $T$ | time since the run began, temperature of the board | s, °C |
+
+All vectors are in the table's frame, which turns with the array. Each formula is evaluated by a test and compared with the
+forward model.
+
+**Figures on the pages.** *d′* is the size of the effect, in standard deviations, that a motion shows when the effect has its
+usual size and everything else that is unknown (the drive, slow noise) is free. Below {_ANY:g} it may be missed. *Share* is the
+part of an effect's whitened energy that a rival explains at its best: the squared correlation of their columns after the nuisance
+parameters. *Nats* is the expected log likelihood by which the effect beats the rival; below {SEPARATED:g} two effects are not
+separable. They are computed as `gfimu check` and `gfimu design` do, for `cube12` with ADXL345 chips at 100 Hz.
+Effects marked ° are taken to be thirty times rarer than the others and are searched
+only where those give no good answer.
+
+Motions: *constant spin*, 30 s at 4 rad/s; *speed sweep*, the scenario `speed_sweep`; *tilted rest*, 60 s at rest, 30° over;
+*calibration poses*, 18 rests of 6 s with faces and edges up; *tumble* and *in the hand*, the scenarios `tumble` and `hand` as
+a free body with a gyro; *strokes*, the scenario `linear_axis`."""
+
+_OWN = """\
+The pages are made from the code: the words from the docstring of the effect's class (fields under *Notes*, see
+`sim/effects/description.py`), the figures from what the package computes. A new effect is a class, its line in
+`sim/effects/registry.py`, and
+```
+python docs/scripts/make_effect_catalogue.py --compute --effect my_effect
+```
+A test fails as long as a registered effect has no page, picture or formula. A point of the grammar in
+`sim/effects/unlisted.py` is registered in the same file and gets its page in the same way. For effects that an installed
+package adds (entry point `gfimu.effects`), `--out FOLDER` writes their pages into a folder of that package; `gfimu show` prints what
+the docstring says, without computed rivals. An effect that a diagnosis names `unknown` has the page of that name."""
+
+
+def _where(effect: type[Effect]) -> str:
+    place = place_of(effect)
+    kinds = [
+        words
+        for words, library in (
+            ("a table that turns", TABLE_EFFECTS),
+            ("a free body", BODY_EFFECTS),
+            ("a linear axis", CARRIAGE_EFFECTS),
+        )
+        if library.get(effect.name) is not None
+    ]
+    looked = f"A diagnosis looks for it on {_and(kinds)}" if kinds else "A diagnosis does not look for it"
+    if effect.name in FURTHER_EFFECTS and effect.name not in BODY_EFFECTS:
+        looked += ", in the wider library that is searched where the usual effects give no good answer"
+    if effect.name == "angle_zero":
+        looked = "A diagnosis looks for it on an inclined table with an encoder"
+    if effect.name == "unknown":
+        looked = "A diagnosis writes it into `twin.toml` where nothing in the library explains a dependence"
+    per_run = " Each mounting has its own." if effect.per_run else ""
+    return f"Place in the chain: **{place}** ({PLACES[place]}). {looked}.{per_run}"
+
+
+def _parameters(effect: type[Effect], text: Description) -> str:
+    array = AccelerometerArray.load("one_adxl345" if effect.name == "mount_turn" else "cube12")
+    rows = ["| parameter | symbol | unit | usual size (1 σ of the prior) | limit |", "|---|---|---|---|---|"]
+    sizes = {size.key: size for size in effect.sizes(array)}
+    seen: dict[tuple[str, ...], list[str]] = {}
+    for key, unit in effect.parameter_units(array).items():
+        size = sizes.get(key)
+        usual = "" if size is None else f"{size.prior_std:.3g}" + (", positive" if size.positive else "")
+        limit = "" if size is None or size.bound == float("inf") else f"{size.bound:.3g}"
+        low_high = effect.shape_limits.get(key)
+        limit = f"{low_high[0]:g} to {low_high[1]:g}" if low_high else limit
+        seen.setdefault((_UNITS.get(unit, unit), usual, limit), []).append(key)
+    for (unit, usual, limit), keys in seen.items():
+        many = f" … ({len(keys)})" if len(keys) > 3 else ""
+        shown = ", ".join(f"`{key}`" for key in keys[:3]) + many
+        symbols = ", ".join(f"${_symbol(one)}$" for one, key in text.symbols.items() if _names(key, keys))
+        rows.append(f"| {shown} | {symbols} | {unit} | {usual} | {limit} |")
+    parts = "amplitude" in " ".join(effect.parameter_units(array)) and bool(sizes)
+    usual = ", ".join(f"`{key}` {size.prior_std:.3g} {size.unit}" for key, size in sizes.items()) if parts else ""
+    fitted = f"\n\nFitted as its parts with the priors {usual}." if usual else ""
+    return "\n".join(rows) + fitted + f"\n\n**Where the figure comes from.** {text.size}"
+
+
+def _names(pattern: str, keys: list[str]) -> bool:
+    """Whether a pattern of keys, such as ``{channel}_m_s2``, stands for one of some keys."""
+    plain = pattern.removeprefix("2π·")
+    if "{" not in plain:
+        return any(key in plain.split(", ") or key == plain for key in keys) or (plain == "channels" and plain in keys)
+    if plain == "{pair}":
+        return "_from_" in keys[0]
+    first, _, last = plain.partition("{")
+    return any(key.startswith(first) and key.endswith(last.rpartition("}")[2]) for key in keys)
+
+
+def _symbol(symbol: str) -> str:
+    return to_latex(f"{symbol.split(', ')[0]} = 0").partition(" = ")[0]
+
+
+def _mathematics(effect: type[Effect], text: Description) -> str:
+    vectors = vectors_of(text.formula, text.symbols)
+    lines = [to_latex(one, vectors).replace(" = ", " &= ", 1) for one in text.formula]
+    body = " \\\\\n".join(lines)
+    symbols = "; ".join(
+        f"${to_latex(f'{name} = 0', vectors).partition(' = ')[0]}$ = {_keyed(key)}"
+        for names, key in text.symbols.items()
+        for name in names.split(", ")
+    )
+    return f"$$\n\\begin{{aligned}}\n{body}\n\\end{{aligned}}\n$$\n\nwith {symbols}. {_tested(effect.name)}"
+
+
+def _keyed(key: str) -> str:
+    return f"2π `{key[3:]}`" if key.startswith("2π·") else f"`{key}`"
+
+
+def _tested(name: str) -> str:
+    if name in BY_CHANCE:
+        return f"A test finds it in simulated recordings to {100 * BY_CHANCE[name]:g} %."
+    tolerance = TOLERANCE.get(name, 1e-6)
+    why = ", to first order in a small angle" if tolerance == 1e-2 else ""
+    return f"A test evaluates it and compares with the forward model: within {100 * tolerance:g} % of the largest change{why}."
+
+
+def _inline(text: Description) -> str:
+    """Return the last equation, or for a long one the first, for a cell of the table."""
+    short = min(text.formula, key=len) if len(text.formula[-1]) > 48 else text.formula[-1]
+    if len(short) > 48 or (short != text.formula[-1] and short.partition(" = ")[0] not in ("y", "n")):
+        return ""
+    return f"${to_latex(short, vectors_of(text.formula, text.symbols))}$".replace("left|", "left\\vert ").replace("right|", "right\\vert ")
+
+
+def _signature(effect: type[Effect], text: Description, found: Mapping[str, Any]) -> str:
+    example = ", ".join(f"`{key}` = {value}" for key, value in text.example.items())
+    largest = sorted(found["rms"].items(), key=lambda item: -item[1])[:3]
+    in_words = ", ".join(f"{name} {value:g}" for name, value in largest)
+    sentences = [
+        f"Change by {example} in the scenario `{found['scenario']}`, without noise:",
+        f"over time, against the quantity that it goes with best, and its amplitude spectrum (Hann window).",
+        f"Largest rms: {in_words} {found['unit']}.",
+    ]
+    if found["share"] >= 0.5:
+        sentences.append(f"A function of the {found['against'].rpartition(',')[0]} explains {100 * found['share']:.0f} % of its variance.")
+    if found["line_hz"] is not None:
+        sentences.append(f"Strongest line of {found['drawn'][0]}: {found['line']:g} {found['unit']} at {found['line_hz']:g} Hz.")
+    if found["drawn"] == ["reference"]:
+        sentences.append("No channel changes, only the reference does.")
+    if found["drawn"][0].startswith("gyro"):
+        sentences.append("No accelerometer changes, only the gyro does.")
+    alt = f"Change by {effect.name} over time, against {found['against']}, and its spectrum"
+    return f"![{alt}](figures/{effect.name}.png)\n\n" + " ".join(sentences)
+
+
+def _rivals(numbers: Mapping[str, Any]) -> str:
+    motions = numbers["motions"]
+    if not motions:
+        return (
+            "It has no size that a motion could enlarge, and no column in the normal equations: it is found from the "
+            "samples themselves before any fit, and computed rivals do not apply."
+        )
+    rows = ["| motion | d′ | rivals: share explained, nats that remain |", "|---|---|---|"]
+    for motion, one in motions.items():
+        if one["detectability"] < _ANY:
+            rows.append(f"| {motion} | {one['detectability']:.2g} | does not show |")
+            continue
+        rivals = [_rival(*rival) for rival in one["rivals"]]
+        more = one.get("more") or []
+        cell = ", ".join(rivals) + (f", and {len(more)} more" if more else "")
+        rows.append(f"| {motion} | {one['detectability']:.3g} | {cell or 'none'} |")
+    return "\n".join(rows) + f"\n\nBold: not separable in this motion (below {SEPARATED:g} nats). Others explain nine tenths or more, but not all."
+
+
+def _rival(name: str, share: float, nats: float) -> str:
+    text = f"{_link(name)} {100 * share:.4g} %, {nats:.3g}"
+    return f"**{text}**" if nats < SEPARATED else text
+
+
+def _separation(text: Description, numbers: Mapping[str, Any]) -> str:
+    parts = [text.experiment]
+    for rig, one in numbers["experiments"].items():
+        where = {"table": "On a table", "body": "On a free body", "carriage": "On a linear axis"}[rig]
+        trials = list(one["nats"])
+        rows = [f"| {where}: nats against | {' | '.join(EXPERIMENTS[trial] for trial in trials)} |"]
+        rows.append("|---|" + "---|" * len(trials))
+        for place, rival in enumerate(one["rivals"]):
+            cells = [one["nats"][trial][place] for trial in trials]
+            shown = [f"**{cell:.3g}**" if cell < SEPARATED else f"{cell:.3g}" for cell in cells]
+            rows.append(f"| {_link(rival)} | {' | '.join(shown)} |")
+        if one["separates"]:
+            sentence = f"Computed: *{EXPERIMENTS[one['separates']]}* separates it from every effect that some motion above confounds it with."
+        else:
+            sentence = (
+                f"Computed: *{EXPERIMENTS[one['best']]}* separates it best. It stays inseparable from "
+                f"{_and([_link(rival) for rival in one['remaining']])} there."
+            )
+        parts += ["\n".join(rows), sentence]
+    return "\n\n".join(parts)
+
+
+def _trial(effect: type[Effect], text: Description, found: Mapping[str, Any] | None) -> str:
+    from effect_trials import simulate_command, twin_of
+
+    lines = [f"```\n{simulate_command(effect, text.example)}"]
+    twin = twin_of(effect.name)
+    lines[0] += f"\ngfimu diagnose hidden.parquet --twin {twin} --out diagnosis\n```"
+    if effect.name.startswith("gyro_"):
+        lines.append('The twin has to be that of a free body: a copy of `cube12_turntable` with `source = "gyro"` in `[drive]`.')
+    lines.append(f"In a twin file it is a table `[[effect]]` with `name = \"{effect.name}\"` and the same parameters.")
+    if isinstance(effect, type) and issubclass(effect, Unlisted):
+        dependence = effect.dependence.name
+        lines.append(
+            f'`verdict.json` names it `"effect": "unlisted"` with `"place": "{effect.grammar_place}"`, `"dependence": "{dependence}"` '
+            f'and `"name": "{effect.name}"`.'
+        )
+    elif effect.name not in ("unknown", "proof_mass"):
+        lines.append(f'`verdict.json` names it `"effect": "{effect.name}"`.')
+    if found is not None:
+        lines.append(f"What the diagnosis of this recording says: {_verdict(found)}.")
+    return "\n\n".join(lines)
+
+
+def _verdict(found: Mapping[str, Any]) -> str:
+    if found["verdict"] == "refused":
+        return f"the recording is refused ({found['message']})"
+    causes = []
+    for one in found["causes"]:
+        name = one.get("name", one["effect"])
+        rivals = one["not_distinguishable_from"]
+        beside = f", not distinguishable from {_and([f'`{rival}`' for rival in rivals])}" if rivals else ""
+        causes.append(f"`{name}` (probability {one['probability']:.2f}{beside})")
+    by = f" by {_and(causes)}" if causes else ""
+    share = f"; {100 * found['share']:.0f} % of the excess on held-out data is removed" if found.get("share") is not None else ""
+    return f"*{found['verdict'].replace('_', ' ')}*{by}{share}"
+
+
+def _on_rail(effect: type[Effect]) -> str:
+    text = describe(effect)
+    vectors = vectors_of(text.formula, text.symbols)
+    lines = "\n".join(to_latex(one, vectors) for one in text.formula)
+    return f"{text.what}\n\n$$\n{lines}\n$$\n\n{text.experiment}"
+
+
+def _link(name: str) -> str:
+    mark = "°" if name in FURTHER_EFFECTS else ""
+    return f"[{name}]({name}.md){mark}" if name in every_effect() else f"`{name}`"
+
+
+def _and(items: list[str]) -> str:
+    return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}"
+
+
+def _sentence(text: str) -> str:
+    return text if text.endswith(".") else f"{text}."

@@ -1,0 +1,131 @@
+"""What every command shares as a command: its help, its former option names, and the nearest name of a wrong option."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import typer
+from typer.core import TyperCommand, TyperGroup
+
+from gfimu.cli.former_options import FORMER_OPTIONS
+from gfimu.cli.help_text import write_help
+from gfimu.errors import nearest_name
+
+__all__ = ["CONTEXT", "CommandApp", "GfimuCommand", "GfimuGroup", "with_width"]
+
+CONTEXT: dict[str, Any] = {"help_option_names": ["--help", "-h"]}
+"""Settings of every command's context: both words for help."""
+
+_WIDEST, _NARROWEST = 100, 24  # columns of help
+_ALIKE = 0.65  # numerical: of difflib; the two dashes that all options share make them more alike than names
+
+
+def with_width(ctx: Any) -> None:
+    """Let help use the width of the terminal, also a narrow one."""
+    ctx.terminal_width = max(min(shutil.get_terminal_size((80, 24)).columns, _WIDEST), _NARROWEST) - 1
+
+
+class GfimuCommand(TyperCommand):
+    """A command: plain help with examples at its end; former names of options work, with a line that says so."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parse arguments, former names of options replaced."""
+        words = ctx.command_path.partition(" ")[2]
+        with_width(ctx)
+        args = _with_present_names(words, args, quiet=ctx.resilient_parsing)
+        try:
+            return super().parse_args(ctx, args)
+        except Exception as error:
+            _suggest_option(error, self.get_params(ctx))
+            raise
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Write the help."""
+        write_help(self, ctx, formatter)
+
+    def shell_complete(self, ctx: Any, incomplete: str) -> list[Any]:
+        """Return the options that a shell offers."""
+        return [item for item in super().shell_complete(ctx, incomplete) if item.value != "-h"]
+
+
+class GfimuGroup(TyperGroup):
+    """A command with commands of its own."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parse the arguments of the group itself."""
+        with_width(ctx)
+        try:
+            return super().parse_args(ctx, args)
+        except Exception as error:
+            _suggest_option(error, self.get_params(ctx))
+            raise
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Find a command by its name; the error for a wrong one names the nearest."""
+        name = args[0]
+        if self.get_command(ctx, name) is None and not name.startswith("-") and not ctx.resilient_parsing:
+            near = nearest_name(name, self.list_commands(ctx))
+            ctx.fail(f"No such command {name!r}" + (f"; did you mean {near!r}?" if near else "."))
+        return super().resolve_command(ctx, args)
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write the commands with the first line of each one's help."""
+        rows = [
+            (name, (command.help or "").partition("\n")[0])
+            for name in self.list_commands(ctx)
+            if (command := self.get_command(ctx, name)) is not None
+        ]
+        with formatter.section("Commands"):
+            formatter.write_dl(rows)
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Write the help."""
+        write_help(self, ctx, formatter)
+
+
+class CommandApp(typer.Typer):
+    """A collection of commands that are all `GfimuCommand`."""
+
+    def __init__(self, **settings: Any) -> None:
+        settings.setdefault("cls", GfimuGroup)
+        super().__init__(rich_markup_mode=None, context_settings=CONTEXT, **settings)
+
+    def command(self, name: str | None = None, **settings: Any) -> Any:
+        """Return the decorator that adds a command."""
+        settings.setdefault("cls", GfimuCommand)
+        return super().command(name, context_settings=CONTEXT, **settings)
+
+
+def _with_present_names(words: str, args: Sequence[str], *, quiet: bool) -> list[str]:
+    """Replace former names of the options of a command, with one line on standard error for each."""
+    renamed = FORMER_OPTIONS.get(words, {})
+    present: list[str] = []
+    rest = list(args)
+    while rest:
+        arg = rest.pop(0)
+        if arg == "--":
+            return [*present, arg, *rest]
+        option, equals, value = arg.partition("=")
+        if option in renamed:
+            if not quiet:
+                sys.stderr.write(f"gfimu: warning: {option} is now called {renamed[option]}; use that name\n")
+            option = renamed[option]
+        present.append(f"{option}{equals}{value}")
+    return present
+
+
+def _suggest_option(error: Exception, params: Iterable[Any]) -> None:
+    """Put the nearest option into the error for one that there is not."""
+    wrong = getattr(error, "option_name", None)
+    if wrong is None or not hasattr(error, "possibilities"):
+        return
+    shown = [param for param in params if param.param_type_name == "option" and not param.hidden]
+    names = [name for param in shown for name in (*param.opts, *param.secondary_opts) if name.startswith("--")]
+    longer = [name for name in names if name.startswith(wrong.casefold())]
+    near = longer[0] if len(longer) == 1 else nearest_name(wrong, names, _ALIKE)
+    error.possibilities = None
+    remedy = f"; did you mean {near}?" if near else ""
+    error.message = f"No such option: {wrong}{remedy}"  # type: ignore[attr-defined]

@@ -1,0 +1,1 @@
+"""What each command prints with --json, as structs: `gfimu.schema` makes the JSON schemas from them."""

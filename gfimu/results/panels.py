@@ -1,0 +1,90 @@
+"""What a picture of a result shows: panels with series, apart from who draws them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Panel", "Series", "axis_series", "text_column"]
+
+
+@dataclass(frozen=True)
+class Series:
+    """Values of one name in a panel.
+
+    Parameters
+    ----------
+    name : str
+        Name in the legend, empty for none.
+    values : ndarray, shape (n,)
+        Values, in the unit of the panel.
+    std : ndarray, shape (n,), optional
+        Standard deviations, drawn as a band or bars of ±2σ.
+    x : ndarray, shape (n,), optional
+        Where the values are, if not at the places of the panel.
+    chip : int, optional
+        Number of the chip whose colour the series has; by default that of its place in the panel.
+    role : {"", "x", "y", "z", "before", "after", "noise"}
+        Body axis, or part in a comparison, whose colour the series has.
+    style : {"line", "dots", "dashes"}
+        How a line is drawn.
+    """
+
+    name: str
+    values: NDArray[np.float64]
+    std: NDArray[np.float64] | None = None
+    x: NDArray[np.float64] | None = None
+    chip: int | None = None
+    role: str = ""
+    style: str = "line"
+
+
+@dataclass(frozen=True)
+class Panel:
+    """Series that share their axes.
+
+    Parameters
+    ----------
+    title : str
+        What is drawn.
+    y_label : str
+        Quantity and unit.
+    series : tuple of Series
+        The series, the first at the back.
+    x : ndarray, shape (n,), or tuple of str
+        Numbers along a line, or names: then each value is a dot with its bar.
+    x_label : str
+        Quantity and unit along the line.
+    scale : {"linear", "zero", "log"}
+        ``zero``: the values' axis begins at zero. ``log``: it is logarithmic, and so is the axis along a line.
+    """
+
+    title: str
+    y_label: str
+    series: tuple[Series, ...]
+    x: NDArray[np.float64] | tuple[str, ...]
+    x_label: str = "time, s"
+    scale: str = "linear"
+
+    @property
+    def by_name(self) -> bool:
+        """Whether the values stand over names."""
+        return isinstance(self.x, tuple)
+
+
+def axis_series(
+    values: NDArray[np.float64], std: NDArray[np.float64] | None = None, *, names: Sequence[str] = ("x", "y", "z")
+) -> tuple[Series, ...]:
+    """Return the components of vectors (n, 3), each in the colour of its axis, with standard deviations (n, 3)."""
+    return tuple(
+        Series(name, values[:, place], None if std is None else std[:, place], role="xyz"[place])
+        for place, name in enumerate(names)
+    )
+
+
+def text_column(values: Iterable[str]) -> NDArray[np.object_]:
+    """Return texts as a column of a table."""
+    return np.array(list(values), dtype=object)
