@@ -33,9 +33,8 @@ def test_every_notebook_is_tested():
 def test_a_script_runs_in_less_than_a_minute_of_processor_time(name, tmp_path):
     environment = os.environ | {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
     before = time.monotonic(), os.times()
-    done = subprocess.run(
-        [sys.executable, str(FOLDER / f"{name}.py")], cwd=tmp_path, env=environment, capture_output=True, text=True
-    )
+    command = [sys.executable, str(FOLDER / f"{name}.py")]
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
     after = os.times()
     assert done.returncode == 0, done.stderr[-2000:]
     spent = after.children_user - before[1].children_user + after.children_system - before[1].children_system

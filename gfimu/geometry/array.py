@@ -24,7 +24,7 @@ from gfimu.geometry.array_file import ArrayFile, ChipTable
 from gfimu.geometry.turning_axis import TurningAxis
 from gfimu.optional_packages import require
 from gfimu.parts.files import add_part_file, is_part_file
-from gfimu.results import TableResult, text_column
+from gfimu.results import TableResult, drawn_chips, text_column
 from gfimu.short_repr import joined, short_repr
 
 if TYPE_CHECKING:
@@ -170,8 +170,6 @@ class AccelerometerArray(TableResult):
             If matplotlib is not installed.
         """
         require("plot", "matplotlib")
-        from gfimu.results.figure import drawn_chips
-
         chips = [(chip.name, chip.position, chip.axes) for chip in self.chips]
         return drawn_chips(self.name, chips, figure)
 
