@@ -32,7 +32,17 @@ _ALIKE = 0.75  # numerical: of difflib; by choice, so that cube13 is near cube12
 
 
 class GfimuError(Exception):
-    """Base of every error that a user's input or environment can cause; commands print it as one line."""
+    """Base of every error that a user's input or environment can cause; commands print it as one line.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> try:
+    ...     gfimu.score("cube13")
+    ... except gfimu.GfimuError as error:
+    ...     print(str(error).partition(";")[0])
+    unknown array 'cube13'
+    """
 
     def __str__(self) -> str:
         """Return the message as one line, the middle left out where what it quotes is very long."""

@@ -35,6 +35,12 @@ def catalogue(kind: str) -> dict[str, str]:
     ------
     InputError
         If the kind is unknown.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> sorted(gfimu.catalogue("twins"))
+    ['cube12_turntable', 'linear_axis', 'mimu4444_free', 'pendulum', 'wheel_pair']
     """
     from gfimu.errors import unknown_name
 
@@ -67,6 +73,12 @@ def show(name: str) -> str:
     ------
     InputError
         If nothing has that name, the file is wrong, or the recording carries no array.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> print(gfimu.show("rest").splitlines()[0])
+    # The unit at rest: noise, biases, drift. Turned on its side with: --set 'mounting_rotvec_rad=[1.5708, 0, 0]'.
     """
     from gfimu.errors import unknown_name
     from gfimu.files.model_files import find_model, list_models
@@ -131,6 +143,12 @@ def new(
     ------
     InputError
         If the kind is unknown, the file or folder is there already, or a file is asked for where a folder is written.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> print(gfimu.new("array").splitlines()[0])
+    #:schema ./array.schema.json
     """
     from gfimu.commands.file_kinds import file_schema
     from gfimu.errors import InputError, unknown_name

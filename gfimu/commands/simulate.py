@@ -54,6 +54,13 @@ def simulate(
     ------
     InputError
         If the scenario or a change is wrong, or an output can't be written where it is asked for.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> run = gfimu.simulate("paper_run", seed=1)
+    >>> run.readings.shape
+    (3000, 12)
     """
     from gfimu.errors import InputError
     from sim.scenarios import Scenario

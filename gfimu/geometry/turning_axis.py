@@ -91,6 +91,12 @@ class TurningAxis:
         Angle between the axis and the vertical, rad; None if it is to be estimated.
     uncertainty : AxisUncertainty
         How exactly axis, places, orientations and biases of the chips are known; exactly by default.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> gfimu.AccelerometerArray.load("wheel_pair").turning_axis.direction
+    array([0., 0., 1.])
     """
 
     direction: NDArray[np.float64]

@@ -108,6 +108,11 @@ class ColumnMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     Channels have the names of an array's sensing axes (a11, a12, a13, a21 …), references those of a recording
     (tacho_rad_s, angle_rad, gyro_x_rad_s …).
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> gfimu.convert("log.csv", column_map="phyphox")  # doctest: +SKIP
     """
 
     name: Annotated[str, _Meta(description="Name of the map.")]
