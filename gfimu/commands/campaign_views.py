@@ -121,7 +121,9 @@ class CampaignTable(PlottedResult):
         }
 
 
-_PICTURE = OutputFile("a picture", (".png", ".svg", ".html"), dict.fromkeys((".png", ".svg", ".html"), ("matplotlib",)), any_case=True)
+_PICTURE = OutputFile(
+    "a picture", (".png", ".svg", ".html"), dict.fromkeys((".png", ".svg", ".html"), ("matplotlib",)), any_case=True
+)
 
 
 def group_columns(groups: Sequence[Group]) -> dict[str, NDArray[Any]]:

@@ -137,7 +137,9 @@ SCENARIO = OutputFile("a scenario file", (".toml",))
 TOML_FILE = OutputFile("a TOML file", (".toml",))
 KALIBR = OutputFile("a Kalibr file", (".yaml", ".yml"))
 JSON_SCHEMA = OutputFile("a JSON schema", (".json",))
-PICTURE = OutputFile("a picture", (".png", ".svg", ".pdf"), dict.fromkeys((".png", ".svg", ".pdf"), ("matplotlib",)), any_case=True)
+PICTURE = OutputFile(
+    "a picture", (".png", ".svg", ".pdf"), dict.fromkeys((".png", ".svg", ".pdf"), ("matplotlib",)), any_case=True
+)
 
 
 def check_parent(path: Path) -> None:
