@@ -143,7 +143,8 @@ class TableTilt(_TwoAxes):
     :size: 0.3°, by choice: 5 mm per metre, a bench that nobody levelled.
     :example: x_rad = 0.004, y_rad = -0.002
     :experiment: Turn slowly through several whole turns. The residual of the channels across the axis is a sine of the
-        table's angle whose amplitude g |n| does not depend on the rate.
+        table's angle whose amplitude, g times the lean, does not depend on
+        the rate.
     """
 
     name = "table_tilt"

@@ -48,7 +48,7 @@ class _OfSupply(Unlisted):
 class GainBySpeed(_OfSupply):
     """A supply that sags with the speed of the motor.
 
-    The chips share the motor's supply, which sags as the motor draws current; the gain of all chips follows |ω|.
+    The chips share the motor's supply, which sags as the motor draws current; the gain of all chips follows its speed.
 
     Notes
     -----
@@ -88,7 +88,8 @@ class GainByRateSquared(_OfSupply):
 class GainByLoad(_OfSupply):
     """A supply that sags when the motor accelerates.
 
-    The motor draws its largest current while it accelerates the table; the gain of all chips follows |α|.
+    The motor draws its largest current while it accelerates the table; the gain of all chips follows the
+    size of α.
 
     Notes
     -----
@@ -174,7 +175,8 @@ class _OfChannels(Unlisted):
 class OffsetBySpeed(_OfChannels):
     """Offsets that follow the speed of the motor.
 
-    The motor's current or field shifts the offset of single channels, in proportion to |ω|.
+    The motor's current or field shifts the offset of single channels, in proportion to the
+    speed.
 
     Notes
     -----
@@ -194,7 +196,8 @@ class OffsetBySpeed(_OfChannels):
 class OffsetByLoad(_OfChannels):
     """Offsets that follow the load of the motor.
 
-    The motor's current while it accelerates shifts the offset of single channels, in proportion to |α|.
+    The motor's current while it accelerates shifts the offset of single channels, in
+    proportion to the size of α.
 
     Notes
     -----
@@ -203,7 +206,7 @@ class OffsetByLoad(_OfChannels):
     :size: 5 mg at 20 rad/s², by choice.
     :example: a11_m_s2_per_rad_s2 = 0.006, a22_m_s2_per_rad_s2 = -0.004
     :experiment: Make ramps of several steepnesses in both directions. A displaced chip reads αr with the sign of α,
-        this reads |α|.
+        this reads its size.
     """
 
     name = "offset_by_load"
