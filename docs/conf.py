@@ -28,7 +28,7 @@ extensions = [
     "sphinx_copybutton",
     "sphinx_design",
 ]
-exclude_patterns = ["_build", "scripts", "examples", "**.ipynb_checkpoints"]
+exclude_patterns = ["_build", "scripts", "examples", "paper", "**.ipynb_checkpoints"]
 
 # Markdown: anchors of headings as on GitHub, so that a page can be read there and here.
 myst_enable_extensions = ["dollarmath", "colon_fence", "deflist", "attrs_inline"]

@@ -8,14 +8,14 @@ import typer
 
 import gfimu
 
-BUILT = {"_build", "api", "cli"}  # folders that Sphinx writes
+APART = {"_build", "api", "cli", "paper"}  # folders that Sphinx writes, and an article
 
 
 def toctree(page):
     """Pages that the contents of a page list."""
     blocks = re.findall(r"^```\{toctree\}\n(.*?)^```", page.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
     names = [line for block in blocks for line in block.splitlines() if line and not line.startswith(":")]
-    return [page.parent / f"{name}.md" for name in names if name.split("/")[0] not in BUILT]
+    return [page.parent / f"{name}.md" for name in names if name.split("/")[0] not in APART]
 
 
 def reached(page):
@@ -28,7 +28,7 @@ def test_the_contents_list_every_page_once(project_root):
     docs = project_root / "docs"
     pages = sorted(reached(docs / "index.md"))
     made = (*docs.rglob("*.md"), *docs.rglob("*.ipynb"))
-    assert pages == sorted(page for page in made if not BUILT & set(page.relative_to(docs).parts))
+    assert pages == sorted(page for page in made if not APART & set(page.relative_to(docs).parts))
 
 
 def load(project_root, name):

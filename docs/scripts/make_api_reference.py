@@ -20,23 +20,24 @@ FOLDER = Path(__file__).resolve().parents[1] / "reference" / "api"
 
 GROUPS = {
     "commands": ("Commands as functions", ("gfimu.commands",)),
-    "recordings": ("Recordings and errors", ("gfimu.recording", "gfimu.errors")),
+    "recordings": ("Recordings and errors", ("gfimu.recording", "gfimu.errors", "gfimu.importing", "gfimu.joining")),
     "geometry": ("Arrays and kinematics", ("gfimu.geometry", "gfimu.array_search")),
-    "motion": ("Motion, attitude and navigation", ("gfimu.motion",)),
+    "motion": ("Motion, attitude and navigation", ("gfimu.motion", "gfimu.known_axis", "gfimu.crash")),
     "rate": ("Angular rate and its bounds", ("gfimu.rate", "gfimu.bounds")),
     "calibration": ("Calibration and noise", ("gfimu.calibration", "gfimu.certification", "gfimu.sensor_noise")),
     "drift": ("Position drift", ("gfimu.position_drift",)),
-    "further": ("Further names", ("gfimu",)),
+    "diagnosis": ("Diagnosis", ("gfimu.diagnosis",)),
+    "twins": ("Scenarios and twins", ("sim",)),
+    "further": ("Further names", ()),
 }
 """Pages of `gfimu`, each with its title and the packages whose public names it holds; the first that fits counts."""
 
 OTHERS = {
     "sim": (
         "Simulation",
-        "Package `sim`. The parts that a program may build on: scenarios, twins, motions, sensors and effects.",
+        "Package `sim`. The parts that a program may build on: motions, sensors, effects and worlds.",
         {
-            "sim.scenarios": ("Scenario", "simulate"),
-            "sim.twin": ("Twin",),
+            "sim.scenarios": ("simulate",),
             "sim.world": ("World",),
             "sim.motion": ("SpinMotion", "BodyMotion", "SpinState", "BodyState"),
             "sim.profiles": ("spin_profile", "Hold", "Ramp", "Sine", "Chirp", "Tumble"),
@@ -75,7 +76,7 @@ def page_of(module: str) -> str:
         for package in packages
         if module == package or module.startswith(package + ".")
     )
-    return next(fits)
+    return next(fits, "further")
 
 
 def pages() -> dict[str, str]:

@@ -14,7 +14,7 @@ from enum import Enum
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, get_args, get_type_hints
+from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 import typer
 
@@ -179,11 +179,16 @@ def _metavar(one: Any, hints: Mapping[str, Any]) -> str:
     """What stands for the value of a parameter: its own word, else the kind of its values."""
     if one.metavar or not _is_option(one):
         return one.metavar or one.name.upper()
-    kinds = [kind for kind in (get_args(hints[one.name]) or (hints[one.name],)) if kind is not type(None)]
-    inner = get_args(kinds[0]) or (kinds[0],)
-    if issubclass(inner[0], Enum):
-        return "|".join(str(choice.value) for choice in inner[0])
-    return " ".join(_KINDS[kind] for kind in inner if kind is not ...)
+    return _words(hints[one.name])
+
+
+def _words(kind: Any) -> str:
+    """Name the values of a type: those of a list, of a choice, or of what is not None in a union."""
+    if get_origin(kind) is Literal:
+        return "|".join(map(str, get_args(kind)))
+    if inside := [inner for inner in get_args(kind) if inner not in {type(None), ...}]:
+        return " ".join(map(_words, inside))
+    return "|".join(str(choice.value) for choice in kind) if issubclass(kind, Enum) else _KINDS[kind]
 
 
 def _is_option(one: Any) -> bool:
