@@ -53,7 +53,7 @@ WORKING = (
     Call("show paper_run", 0, "[sensor]"),
     Call("show cube12_turntable", 0, "array"),
     Call("new scenario --out scenario.toml", 0, "scenario.toml"),
-    Call("drift --array cube12 --time 0.3 --bias-mg 35 --noise-ug 290 --monte-carlo 20", 0, "Position error"),
+    Call("drift --array cube12 --duration 0.3 --bias-mg 35 --noise-ug 290 --monte-carlo 20", 0, "Position error"),
     Call("optimize --chips 4 --restarts 1 --out found.toml", 0, "found.toml"),
     Call("inspect run.parquet", 0, "a11"),
     Call("convert run.parquet run.csv", 0, "run.csv"),

@@ -58,3 +58,15 @@ def test_commands_run_in_one_folder_from_top_to_bottom(tmp_path):
 )
 def test_numbers_agree_to_their_last_digit(stored, made, same):
     assert (not excerpts.difference(stored, made)) is same
+
+
+@pytest.mark.study
+def test_the_picture_of_the_report_is_drawn(tmp_path):
+    location = importlib.util.spec_from_file_location("make_report_picture", SCRIPT.with_name("make_report_picture.py"))
+    script = importlib.util.module_from_spec(location)
+    location.loader.exec_module(script)
+    if script.browser() is None:
+        pytest.skip("no Chromium here")
+    drawn, stored = script.main(tmp_path), excerpts.DOCS / "figures" / "diagnosis_report.png"
+    assert drawn.read_bytes()[16:24] == stored.read_bytes()[16:24]  # of the same size
+    assert drawn.stat().st_size > 30_000

@@ -82,7 +82,8 @@ def test_no_shipped_file_calls_itself_the_printed_matrix(project_root):
 
 
 CITED = re.compile(
-    r"(?:(GF-IMU|Persian) (?:calibration )?)?paper[^.;\n]{0,40}?\beqs?\.? (\d+)(?:[-–](\d+))?|(?<![\w-])eqs (28)[-–](29)"
+    r"(?:(GF-IMU|Persian) (?:calibration )?)?paper[^.;\n]{0,40}?\beqs?\.? (\d+)(?:[-–](\d+))?"
+    r"|(?<![\w-])eqs (28)[-–](29)"
 )
 
 

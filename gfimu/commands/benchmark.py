@@ -77,7 +77,8 @@ class BenchmarkRun:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content for JSON."""
-        return {**vars(self), "folder": str(self.folder), "answers": str(self.answers)}
+        kept = {name: getattr(self, name) for name in ("method", "worlds", "failed")}
+        return {"folder": str(self.folder), **kept, "files": {"answers": str(self.answers)}}
 
 
 @dataclass(frozen=True)

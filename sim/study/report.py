@@ -432,7 +432,7 @@ def write_report(outcomes: Sequence[Outcome], folder: str | Path) -> list[Path]:
         )
     text = (
         "# Study of the diagnosis\n\n"
-        "Hidden worlds are drawn from fixed seeds; noise levels are not told to the tool. A size is "
+        "Hidden worlds are drawn from fixed seeds; the diagnosis is not given the noise levels. A size is "
         "d′ = √Σ(Δ/σ)² over all channels and the tachometer with the drive known. Made by\n\n"
         "```\npython -m sim.study run STUDY ... --out outcomes\n"
         "python -m sim.study report docs/accuracy/diagnosis-study.jsonl.xz outcomes --out docs/accuracy\n```\n\n"

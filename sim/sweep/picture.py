@@ -81,7 +81,7 @@ def campaign_picture(
     with mpl.rc_context(_STYLE):
         figure = _figure(f"{folder.name}: {len(table)} of {len(design)} cases", table, design, drawn, len(there))
         with atomic_path(path) as part:
-            if Path(path).suffix == ".html":
+            if Path(path).suffix.lower() == ".html":
                 Path(part).write_text(_page(figure, folder, table, design), encoding="utf-8")
             else:
                 figure.savefig(part, dpi=120, format=Path(path).suffix.lstrip("."), metadata=_metadata(path))
@@ -101,7 +101,7 @@ def _words(name: str) -> str:
 
 
 def _metadata(path: str | Path) -> dict[str, None]:
-    return {"Date": None} if Path(path).suffix != ".png" else {}
+    return {"Date": None} if Path(path).suffix.lower() != ".png" else {}
 
 
 def _figure(title: str, table: pa.Table, design: Design, results: list[str], all_results: int) -> Figure:
