@@ -70,16 +70,16 @@ def print_table(
     from rich.table import Table
     from rich.text import Text
 
-    screen, rows = console(), [[str(cell) for cell in row] for row in rows]
+    screen, cells = console(), [[str(cell) for cell in row] for row in rows]
     table = Table(title=Text(title), title_justify="left", title_style="bold", caption=Text(note) if note else None)
     table.caption_justify = "left"
     for place, name in enumerate(header):
         table.add_column(Text(name), justify="left" if place < left else "right", overflow="fold")
-    for row in rows:
+    for row in cells:
         table.add_row(*[Text(cell) for cell in row])
     least = Measurement.get(screen, screen.options.update(max_width=_ENDLESS), table).minimum
     if screen.is_terminal and least > screen.width:
-        _print_as_lists(title, header, rows, note)
+        _print_as_lists(title, header, cells, note)
     else:
         screen.print(table)
 
