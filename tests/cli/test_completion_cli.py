@@ -12,7 +12,6 @@ import pytest
 
 from gfimu.cli.effect_names import EFFECT_NAMES
 from gfimu.commands.catalogue import catalogue
-from gfimu.plugins import plugins
 
 PROGRAM = [sys.executable, "-c", "from gfimu.cli import main; main()"]
 QUIET = {"_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION": "1"}
@@ -71,10 +70,9 @@ def test_bash_is_offered_names_and_values(completed, line, offered):
 
 
 def test_the_names_of_effects_are_those_of_the_library():
-    from sim.effects.base import Effect
+    from sim.effects import added_effects
 
-    others = plugins("gfimu.effects", type, own=()) if Effect is None else {}
-    assert [name for name in catalogue("effects") if name not in others] == list(EFFECT_NAMES)
+    assert [name for name in catalogue("effects") if name not in added_effects()] == list(EFFECT_NAMES)
 
 
 @pytest.mark.parametrize(

@@ -67,7 +67,7 @@ CALLS = {
     "firmware trace --duration 0.002 --out trace.vcd": "firmware trace",
     "firmware check --duration 0.05": "firmware check",
 }
-"""Calls, in this order, and the command whose schema their results have."""
+"""Calls, and the command whose schema their results have."""
 
 BY_HAND = {"demo", "live", "record", "firmware build", "firmware faults"}
 """Commands with a test of their own, below or beside those of the command."""
@@ -110,6 +110,12 @@ def here(tmp_path_factory):
     return folder
 
 
+@pytest.fixture(scope="module")
+def campaign(here):
+    """The campaign that the calls look at, in that folder."""
+    return gfimu.campaign(here / "plan.toml", out=here / "camp", workers=1)
+
+
 def refuse_constant(text):
     raise AssertionError(f"{text} is no JSON")
 
@@ -136,9 +142,11 @@ def fits(name, found):
 
 
 @pytest.mark.parametrize("line", CALLS)
-def test_a_result_is_as_its_schema_says(gfimu_command, here, monkeypatch, line):
+def test_a_result_is_as_its_schema_says(gfimu_command, here, monkeypatch, request, line):
     if line.startswith("firmware"):
         pytest.importorskip("unicorn")
+    if line.startswith("campaign"):
+        request.getfixturevalue("campaign")
     monkeypatch.chdir(here)
     result = gfimu_command(*line.split(), "--json")
     assert result.code == 0, result.stderr
