@@ -52,6 +52,8 @@ def check_layout(path: Path) -> Layout:
         values = np.concatenate([np.ravel(part["scalars"]).astype(float) for part in lines.values()])
         assert np.isfinite(values).any(), f"{name}: nothing is drawn"
         assert UNITS.search(name) or WITHOUT_UNIT.match(name), f"{name}: without unit"
+        low, high = _first(layout.blueprint[f"{view}/ScalarAxis"]["range"])
+        assert high > low, name
         times = np.concatenate([np.ravel(part["time"]).astype(float) for part in lines.values()]) * 1e-9
         axis = layout.blueprint[f"{view}/TimeAxis"]
         spanned = _first(axis["view_range"])

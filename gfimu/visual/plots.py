@@ -106,7 +106,7 @@ class Plot:
                 link=rrb.components.LinkAxis.LinkToGlobal if together else rrb.components.LinkAxis.Independent,
                 view_range=whole,
             ),
-            axis_y=None if self.span is None else rrb.ScalarAxis(range=self.span),
+            axis_y=rrb.ScalarAxis(range=self.span or _all_values(self.lines)),
             plot_legend=rrb.PlotLegend(
                 corner=_emptiest_corner(self.lines), visible=self.legend and len(self.lines) <= LONGEST_LEGEND
             ),
@@ -117,6 +117,17 @@ def _whole_run(lines: Sequence[Line]) -> tuple[float, float]:
     """First and last time of the lines, s."""
     times = [float(line.t[end]) for line in lines if len(line.t) for end in (0, -1)] or [0.0]
     return min(times), max(times)
+
+
+def _all_values(lines: Sequence[Line]) -> tuple[float, float]:
+    """Range of all values with a margin; the viewer's own is that of the samples that have arrived when it opens."""
+    values = np.concatenate([line.values.ravel() for line in lines])
+    values = values[np.isfinite(values)]
+    if not len(values):
+        return -1.0, 1.0
+    low, high = float(values.min()), float(values.max())
+    margin = 0.05 * (high - low) or 0.1 * abs(high) or 1.0
+    return low - margin, high + margin
 
 
 def _emptiest_corner(lines: Sequence[Line]) -> rrb.Corner2D:
