@@ -19,6 +19,7 @@ __all__ = [
     "RecordingWarning",
     "UnitError",
     "WriteError",
+    "did_you_mean",
     "naming",
     "nearest_name",
     "unknown_name",
@@ -26,11 +27,22 @@ __all__ = [
 
 _LONGEST = 2000  # numerical: characters of a message
 _CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029]")
+_SHORTEST = 3  # numerical: letters of a name's beginning that say which one is meant
 _ALIKE = 0.75  # numerical: of difflib; by choice, so that cube13 is near cube12 and nonsense near nothing
 
 
 class GfimuError(Exception):
-    """Base of every error that a user's input or environment can cause; commands print it as one line."""
+    """Base of every error that a user's input or environment can cause; commands print it as one line.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> try:
+    ...     gfimu.score("cube13")
+    ... except gfimu.GfimuError as error:
+    ...     print(str(error).partition(";")[0])
+    unknown array 'cube13'
+    """
 
     def __str__(self) -> str:
         """Return the message as one line, the middle left out where what it quotes is very long."""
@@ -95,20 +107,29 @@ def naming(source: str) -> Iterator[None]:
 def unknown_name(kind: str, name: str, valid: Iterable[str]) -> InputError:
     """Build the error for a name that is not in a list, with the list and the nearest name."""
     names = sorted(valid)
-    near = nearest_name(name, names)
-    remedy = f"; did you mean {near!r}?" if near else ""
-    return InputError(f"unknown {kind} {name!r}; valid: {', '.join(names)}{remedy}")
+    return InputError(f"unknown {kind} {name!r}; valid: {', '.join(names)}{did_you_mean(name, names)}")
+
+
+def did_you_mean(name: str, valid: Iterable[str], alike: float = _ALIKE) -> str:
+    """Return the end of a message on a wrong name: the one of a list that was probably meant; empty where none is."""
+    near = nearest_name(name, valid, alike)
+    return f"; did you mean {near!r}?" if near else ""
 
 
 def nearest_name(name: str, valid: Iterable[str], alike: float = _ALIKE) -> str | None:
     """Return the name of a list that a wrong one was probably meant to be; None where none is near.
 
-    Case, and a dash for an underscore, count for nothing. Names are near from a ratio ``alike`` of `difflib` on.
+    Case, and a dash for an underscore, count for nothing. Names are near from a ratio ``alike`` of `difflib` on; else
+    the one that begins with what was given is, if it is the only one.
     """
 
     def plainly(text: str) -> str:
         return text.casefold().replace("-", "_")
 
     meant = {plainly(one): one for one in valid}
-    near = difflib.get_close_matches(plainly(name), meant, 1, alike)
+    given = plainly(name)
+    near = difflib.get_close_matches(given, meant, 1, alike)
+    longer = [one for one in meant if len(given) >= _SHORTEST and one.startswith(given)]
+    if not near and len(longer) == 1:
+        near = longer
     return meant[near[0]] if near else None

@@ -18,6 +18,7 @@ from gfimu.geometry.kinematics import (
     specific_force,
     unseen_motions,
 )
+from gfimu.lazy_names import former_name
 
 __all__ = [
     "ALTERNATE_CORNERS",
@@ -37,3 +38,5 @@ __all__ = [
     "specific_force",
     "unseen_motions",
 ]
+
+former_name(__name__, "gfimu.geometry.kinematics", removed="0.4")

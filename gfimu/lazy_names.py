@@ -1,14 +1,15 @@
-"""Names of a package that load on first use, so that importing the package waits for nothing heavy."""
+"""Names of a package that load on first use, so that its import waits for nothing heavy; former names of modules."""
 
 from __future__ import annotations
 
 import importlib
+import warnings
 from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 from gfimu.optional_packages import require
 
-__all__ = ["names_on_first_use"]
+__all__ = ["former_name", "names_on_first_use"]
 
 
 def names_on_first_use(
@@ -40,3 +41,19 @@ def names_on_first_use(
         return getattr(importlib.import_module(f"{package}.{homes[name]}"), name)
 
     return load
+
+
+def former_name(module: str, new: str, *, removed: str) -> None:
+    """Warn that a module is imported by its former name; called by the module itself.
+
+    Parameters
+    ----------
+    module : str
+        The former name.
+    new : str
+        The module in its place.
+    removed : str
+        Version of gfimu that will not have the former name any more.
+    """
+    # Above this call and the module stand two frames of the import machinery's, which Python leaves out of the count.
+    warnings.warn(f"{module} is removed in gfimu {removed}; import {new}", DeprecationWarning, stacklevel=3)

@@ -10,16 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from gfimu.geometry.array import AccelerometerArray
+from gfimu.geometry.turning_axis import TurningAxis
 from gfimu.visual.colours import chip_colour
-from gfimu.visual.rig import is_cube
+from gfimu.visual.rig import is_cube, stand_height
 from gfimu.visual.scene import Box, Cylinder, Mesh, Shape
 from sim.rigs.rig_model import turntable_model
 from sim.world import World
 
-__all__ = ["rig_drawing"]
+__all__ = ["array_on_axis", "rig_drawing"]
 
 _FOOT = "adapter"
 _BOARD = 0.004  # half size, m: boards are larger, the packages on them smaller
+_LEANING = 0.2  # rad: an axis that leans less is that of a table
 _MOVING = ("cube", "table")  # a body belongs to the first of these among its ancestors, to the base otherwise
 
 
@@ -52,6 +55,24 @@ def rig_drawing(world: World) -> Mapping[str, Sequence[Shape]]:
             shape = replace(shape, colour=colour)
         shapes[group].append(shape)
     return {name: drawn for name, drawn in shapes.items() if name != "cube" or is_cube(world.array)}
+
+
+def array_on_axis(world: World) -> tuple[AccelerometerArray, NDArray[np.float64]] | None:
+    """Return the array with the axis of a pendulum or a wheel, for its picture; None on a table.
+
+    Returns
+    -------
+    (AccelerometerArray, ndarray of shape (3,)) or None
+        The array with its turning axis in the body frame, and how far up the picture is moved, m, so that all of the
+        body's circle is above the ground. None where the axis leans less than 0.2 rad: it is a table's.
+    """
+    lean = float(np.linalg.norm(world.axis_rotvec))
+    if world.slide is not None or lean < _LEANING:
+        return None
+    to_body = Rotation.from_rotvec(world.mount_rotvec).inv()
+    axis = TurningAxis(to_body.apply([0.0, 0.0, 1.0]), to_body.apply(-world.cube_offset), inclination=lean)
+    arm = float(np.linalg.norm(world.cube_offset))
+    return replace(world.array, turning_axis=axis), np.array([0.0, 0.0, arm + stand_height(world.array)])
 
 
 def _group(model: mujoco.MjModel, body: int) -> str:

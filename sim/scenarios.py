@@ -87,6 +87,13 @@ class Scenario:
         Board temperature at the start and in the end, °C, and the time constant between them, s.
     description : str
         One line for people.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> scenario = gfimu.Scenario.load("paper_run", changes=["sensor.range_g=8"])
+    >>> scenario.name, scenario.sample_rate
+    ('paper_run', 100.0)
     """
 
     name: str

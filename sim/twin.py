@@ -86,6 +86,13 @@ class Twin:
         How the array sits on the table's axis, in place of upright by ``cube_offset``.
     carriage_axis : tuple of float
         Direction of positive places of a linear axis, in the world.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> twin = gfimu.Twin.load("cube12_turntable")
+    >>> twin.array.name, twin.drive_source
+    ('cube12', 'tacho')
     """
 
     array: AccelerometerArray

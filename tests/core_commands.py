@@ -1,4 +1,4 @@
-"""Walk through gfimu's commands where only its core is installed: those that work, and those that are refused.
+"""Call gfimu's commands where only its core is installed: those that work, and those that are refused.
 
     python tests/core_commands.py            in an environment with the core alone (`tests/matrix.py light` makes one)
     python tests/core_commands.py --block    in any environment: imports of all optional packages fail
@@ -53,7 +53,7 @@ WORKING = (
     Call("show paper_run", 0, "[sensor]"),
     Call("show cube12_turntable", 0, "array"),
     Call("new scenario --out scenario.toml", 0, "scenario.toml"),
-    Call("drift --array cube12 --time 0.3 --bias-mg 35 --noise-ug 290 --monte-carlo 20", 0, "Position error"),
+    Call("drift --array cube12 --duration 0.3 --bias-mg 35 --noise-ug 290 --monte-carlo 20", 0, "Position error"),
     Call("optimize --chips 4 --restarts 1 --out found.toml", 0, "found.toml"),
     Call("inspect run.parquet", 0, "a11"),
     Call("convert run.parquet run.csv", 0, "run.csv"),
@@ -72,6 +72,7 @@ REFUSED = (
     refused("demo", "gfimu demo", "mujoco, rerun-sdk and matplotlib", "sim,view,plot"),
     refused("simulate paper_run --out no.csv", *MUJOCO),
     refused("tolerance cube12 --closed-form", *MUJOCO),
+    refused("benchmark list", "gfimu benchmark", "mujoco", "sim"),
     refused("firmware run --out no.csv", "gfimu firmware run", "unicorn and mujoco", "firmware,sim"),
     refused("convert cube12 no.xml", "no.xml: what is converted", "mujoco", "sim"),
     refused("convert run.csv no.mcap", "no.mcap: what is converted", "mcap and rosbags", "formats"),
@@ -154,7 +155,7 @@ def wrong_calls(calls: Sequence[Call]) -> list[str]:
 
 
 def main() -> None:
-    """Walk in a folder that is made and removed."""
+    """Make the calls in a folder that is removed."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--block", action="store_true", help="let imports of all optional packages fail")
     options.add_argument("--part", choices=("all", "refused"), default="all", help="which calls")

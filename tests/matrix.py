@@ -8,8 +8,8 @@
     python tests/matrix.py sizes                           size and packages of each extra, as a table
 
 Continuous integration calls these, and a person may. They need uv (``pip install uv``), which resolves lowest versions
-and installs in seconds. ``--tests all`` runs the whole suite, which takes an hour on two processors, in place of the
-rooms that use most of the packages' interfaces (`ROOMS`); further arguments go to pytest.
+and installs in seconds. ``--tests all`` runs the whole suite in place of the rooms that use most of the packages'
+interfaces (`ROOMS`); further arguments go to pytest.
 """
 
 from __future__ import annotations

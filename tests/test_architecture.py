@@ -5,6 +5,8 @@ import graphlib
 import importlib
 import inspect
 import re
+import subprocess
+import sys
 from collections import Counter
 from pathlib import Path
 
@@ -484,6 +486,15 @@ FORMER = {
     "gfimu.diagnosis.model": "gfimu.world_model",
 }
 """Modules that keep a former name for the programs of users, and where their content is."""
+
+
+@pytest.mark.parametrize("former", FORMER)
+def test_former_names_of_modules_warn_where_they_are_imported(former, tmp_path):
+    script = tmp_path / "old.py"
+    script.write_text(f"import {former}\n", encoding="utf-8")
+    done = subprocess.run([sys.executable, "-W", "default", script], capture_output=True, text=True, check=True)
+    assert f"old.py:1: DeprecationWarning: {former} is removed in gfimu " in done.stderr
+    assert f"; import {FORMER[former]}\n" in done.stderr
 
 
 @pytest.mark.parametrize("former", FORMER)

@@ -37,7 +37,7 @@ DRAWING = {
         "gfimu/visual/scene.py",
         "gfimu/visual/trace.py",
     },
-    "mujoco": {"sim/drawing.py"},
+    "mujoco": {"sim/drawing.py", "sim/benchmark/generators/independent_table.py"},
     "unicorn": {"firmware_bridge/board/cpu.py"},  # guarded there
 }
 """Modules that import an optional package at their top; whoever imports them has called `require` before."""

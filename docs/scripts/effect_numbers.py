@@ -47,6 +47,7 @@ def _of(
             found["experiments"][rig] = _separation(rivals, trials)
     if not found["motions"] and effect.place == "data" and name != "dropped_frames":
         found["motions"]["speed sweep"] = _listed(data_table(name, describe(effect).example))
+        found["of_samples"] = True
     return found
 
 

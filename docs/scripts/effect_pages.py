@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from effect_formulas import BY_CHANCE, TOLERANCE, to_latex, vectors_of
+from effect_trials import simulate_command, twin_of
 
 from gfimu.diagnosis.design.proposal import SEPARATED
 from gfimu.diagnosis.policy import Policy
@@ -17,7 +18,7 @@ from sim.effects.catalogue import PLACES, every_effect, place_of
 from sim.effects.description import Description, describe
 from sim.effects.unlisted import Unlisted
 
-__all__ = ["EXPERIMENTS", "index_page", "page"]
+__all__ = ["EXPERIMENTS", "link", "page"]
 
 EXPERIMENTS = {
     "sweep": "speed sweep",
@@ -34,6 +35,8 @@ EXPERIMENTS = {
 """Words for the experiments of `effect_rivals`."""
 
 _UNITS = {RATIO: "1", NUMBER: "number", NAME: "name"}
+SLOWEST_LINE = 0.3  # Hz: what is slower is the course of the run
+LEAST, MOST = 0.1, 1000  # nats: what is less, or more, is printed so
 _ANY = Policy().seen
 
 
@@ -42,7 +45,7 @@ def page(effect: type[Effect], numbers: Mapping[str, Any]) -> str:
     text = describe(effect)
     parts = [
         f"# {effect.name}",
-        f"**{_sentence(text.title)}** {text.what}",
+        f"**{_sentence(_plain(text.title))}** {_plain(text.what)}",
         _where(effect),
         "## Parameters",
         _parameters(effect, text),
@@ -51,7 +54,7 @@ def page(effect: type[Effect], numbers: Mapping[str, Any]) -> str:
         "## Signature",
         _signature(effect, text, numbers["signature"]),
         "## Rivals",
-        _rivals(numbers),
+        _rivals(effect, numbers),
         "## How to separate it",
         _separation(text, numbers),
         "## In real data",
@@ -63,81 +66,6 @@ def page(effect: type[Effect], numbers: Mapping[str, Any]) -> str:
     if rail is not None and rail is not effect:
         parts += ["## On a linear axis", _on_rail(rail)]
     return "\n\n".join(parts) + "\n"
-
-
-def index_page(effects: Mapping[str, type[Effect]], numbers: Mapping[str, Any]) -> str:
-    """Return the table of all effects, by place in the chain."""
-    parts = [
-        "# Catalogue of effects",
-        _INTRODUCTION,
-    ]
-    for place, words in PLACES.items():
-        mine = [effect for effect in effects.values() if place_of(effect) == place]
-        if not mine:
-            continue
-        rows = ["| effect | what is so in the world and missing in the simulation | formula | not separable in a sweep from |"]
-        rows.append("|---|---|---|---|")
-        for effect in mine:
-            sweep = numbers[effect.name]["motions"].get("speed sweep", {"rivals": []})
-            rivals = [rival for rival, _, nats in sweep["rivals"] if nats < SEPARATED]
-            formula = _inline(describe(effect))
-            rows.append(f"| {_link(effect.name)} | {effect.summary} | {formula} | {', '.join(map(_link, rivals))} |")
-        parts += [f"## {place.capitalize()}: {words}", "\n".join(rows)]
-    names = "\n".join(effects)
-    parts += ["## Your own effects", _OWN, f"```{{toctree}}\n:hidden:\n:maxdepth: 1\n\n{names}\n```"]
-    return "\n\n".join(parts) + "\n"
-
-
-_INTRODUCTION = f"""\
-One page per effect that a simulated rig can have and a diagnosis can name: what it is, its formula, what it changes in a
-run, which effects it is confounded with in which motion, and the experiment that separates them. `gfimu list effects` lists
-them; `gfimu show table_tilt` prints the essence of a page.
-
-The chain is: geometry and gravity → motion → sensing → sampling → data. The reading of an ideal sensor whose axis is
-$\\boldsymbol{{a}}$, at the place $\\boldsymbol{{r}}$ from the table's axis $\\boldsymbol{{z}}$, is the specific force there along it:
-
-$$
-f = \\boldsymbol{{a}} \\cdot \\boldsymbol{{F}}, \\qquad
-\\boldsymbol{{F}} = g\\,\\boldsymbol{{u}} + \\alpha\\,\\boldsymbol{{z}} \\times \\boldsymbol{{r}}
-+ \\omega^2\\,\\boldsymbol{{z}} \\times (\\boldsymbol{{z}} \\times \\boldsymbol{{r}})
-$$
-
-| symbol | meaning | unit |
-|---|---|---|
-| $f$, $y$ | reading of a channel before and after the effect; an index is a channel | m/s² |
-| $\\theta$, $\\omega$, $\\alpha$ | angle, rate and angular acceleration of the table | rad, rad/s, rad/s² |
-| $\\Omega$, $\\Omega'$ | reading of the reference before and after the effect; of a free body the three of the gyro | rad/s |
-| $\\boldsymbol{{u}}$, $g$ | up, in the table's frame; local gravity | 1, m/s² |
-| $R_z(\\theta)$ | rotation by the angle $\\theta$ about $\\boldsymbol{{z}}$ | |
-| $\\boldsymbol{{\\rho}}$ | place of a chip from the cube's centre | m |
-| $t$, $T$ | time since the run began, temperature of the board | s, °C |
-
-All vectors are in the table's frame, which turns with the array. Each formula is evaluated by a test and compared with the
-forward model.
-
-**Figures on the pages.** *d′* is the size of the effect, in standard deviations, that a motion shows when the effect has its
-usual size and everything else that is unknown (the drive, slow noise) is free. Below {_ANY:g} it may be missed. *Share* is the
-part of an effect's whitened energy that a rival explains at its best: the squared correlation of their columns after the nuisance
-parameters. *Nats* is the expected log likelihood by which the effect beats the rival; below {SEPARATED:g} two effects are not
-separable. They are computed as `gfimu check` and `gfimu design` do, for `cube12` with ADXL345 chips at 100 Hz.
-Effects marked ° are taken to be thirty times rarer than the others and are searched
-only where those give no good answer.
-
-Motions: *constant spin*, 30 s at 4 rad/s; *speed sweep*, the scenario `speed_sweep`; *tilted rest*, 60 s at rest, 30° over;
-*calibration poses*, 18 rests of 6 s with faces and edges up; *tumble* and *in the hand*, the scenarios `tumble` and `hand` as
-a free body with a gyro; *strokes*, the scenario `linear_axis`."""
-
-_OWN = """\
-The pages are made from the code: the words from the docstring of the effect's class (fields under *Notes*, see
-`sim/effects/description.py`), the figures from what the package computes. A new effect is a class, its line in
-`sim/effects/registry.py`, and
-```
-python docs/scripts/make_effect_catalogue.py --compute --effect my_effect
-```
-A test fails as long as a registered effect has no page, picture or formula. A point of the grammar in
-`sim/effects/unlisted.py` is registered in the same file and gets its page in the same way. For effects that an installed
-package adds (entry point `gfimu.effects`), `--out FOLDER` writes their pages into a folder of that package; `gfimu show` prints what
-the docstring says, without computed rivals. An effect that a diagnosis names `unknown` has the page of that name."""
 
 
 def _where(effect: type[Effect]) -> str:
@@ -166,6 +94,7 @@ def _parameters(effect: type[Effect], text: Description) -> str:
     array = AccelerometerArray.load("one_adxl345" if effect.name == "mount_turn" else "cube12")
     rows = ["| parameter | symbol | unit | usual size (1 σ of the prior) | limit |", "|---|---|---|---|---|"]
     sizes = {size.key: size for size in effect.sizes(array)}
+    vectors = vectors_of(text.formula, text.symbols)
     seen: dict[tuple[str, ...], list[str]] = {}
     for key, unit in effect.parameter_units(array).items():
         size = sizes.get(key)
@@ -177,7 +106,7 @@ def _parameters(effect: type[Effect], text: Description) -> str:
     for (unit, usual, limit), keys in seen.items():
         many = f" … ({len(keys)})" if len(keys) > 3 else ""
         shown = ", ".join(f"`{key}`" for key in keys[:3]) + many
-        symbols = ", ".join(f"${_symbol(one)}$" for one, key in text.symbols.items() if _names(key, keys))
+        symbols = ", ".join(f"${_symbol(one, vectors)}$" for one, key in text.symbols.items() if _names(key, keys))
         rows.append(f"| {shown} | {symbols} | {unit} | {usual} | {limit} |")
     parts = "amplitude" in " ".join(effect.parameter_units(array)) and bool(sizes)
     usual = ", ".join(f"`{key}` {size.prior_std:.3g} {size.unit}" for key, size in sizes.items()) if parts else ""
@@ -190,25 +119,22 @@ def _names(pattern: str, keys: list[str]) -> bool:
     plain = pattern.removeprefix("2π·")
     if "{" not in plain:
         return any(key in plain.split(", ") or key == plain for key in keys) or (plain == "channels" and plain in keys)
-    if plain == "{pair}":
+    if "{neighbour}" in plain:
         return "_from_" in keys[0]
     first, _, last = plain.partition("{")
     return any(key.startswith(first) and key.endswith(last.rpartition("}")[2]) for key in keys)
 
 
-def _symbol(symbol: str) -> str:
-    return to_latex(f"{symbol.split(', ')[0]} = 0").partition(" = ")[0]
+def _symbol(symbols: str, vectors: frozenset[str]) -> str:
+    """Return one or several symbols, parted by commas, as LaTeX."""
+    return ", ".join(to_latex(f"{one} = 0", vectors).partition(" = ")[0] for one in symbols.split(", "))
 
 
 def _mathematics(effect: type[Effect], text: Description) -> str:
     vectors = vectors_of(text.formula, text.symbols)
     lines = [to_latex(one, vectors).replace(" = ", " &= ", 1) for one in text.formula]
     body = " \\\\\n".join(lines)
-    symbols = "; ".join(
-        f"${to_latex(f'{name} = 0', vectors).partition(' = ')[0]}$ = {_keyed(key)}"
-        for names, key in text.symbols.items()
-        for name in names.split(", ")
-    )
+    symbols = "; ".join(f"${_symbol(one, vectors)}$ = {_keyed(key)}" for one, key in text.symbols.items())
     return f"$$\n\\begin{{aligned}}\n{body}\n\\end{{aligned}}\n$$\n\nwith {symbols}. {_tested(effect.name)}"
 
 
@@ -221,15 +147,10 @@ def _tested(name: str) -> str:
         return f"A test finds it in simulated recordings to {100 * BY_CHANCE[name]:g} %."
     tolerance = TOLERANCE.get(name, 1e-6)
     why = ", to first order in a small angle" if tolerance == 1e-2 else ""
-    return f"A test evaluates it and compares with the forward model: within {100 * tolerance:g} % of the largest change{why}."
-
-
-def _inline(text: Description) -> str:
-    """Return the last equation, or for a long one the first, for a cell of the table."""
-    short = min(text.formula, key=len) if len(text.formula[-1]) > 48 else text.formula[-1]
-    if len(short) > 48 or (short != text.formula[-1] and short.partition(" = ")[0] not in ("y", "n")):
-        return ""
-    return f"${to_latex(short, vectors_of(text.formula, text.symbols))}$".replace("left|", "left\\vert ").replace("right|", "right\\vert ")
+    return (
+        "A test evaluates it and compares with the forward model: within "
+        f"{100 * tolerance:g} % of the largest change{why}."
+    )
 
 
 def _signature(effect: type[Effect], text: Description, found: Mapping[str, Any]) -> str:
@@ -238,13 +159,18 @@ def _signature(effect: type[Effect], text: Description, found: Mapping[str, Any]
     in_words = ", ".join(f"{name} {value:g}" for name, value in largest)
     sentences = [
         f"Change by {example} in the scenario `{found['scenario']}`, without noise:",
-        f"over time, against the quantity that it goes with best, and its amplitude spectrum (Hann window).",
+        "over time, against the quantity that it goes with best, and its amplitude spectrum (Hann window).",
         f"Largest rms: {in_words} {found['unit']}.",
     ]
     if found["share"] >= 0.5:
-        sentences.append(f"A function of the {found['against'].rpartition(',')[0]} explains {100 * found['share']:.0f} % of its variance.")
-    if found["line_hz"] is not None:
-        sentences.append(f"Strongest line of {found['drawn'][0]}: {found['line']:g} {found['unit']} at {found['line_hz']:g} Hz.")
+        sentences.append(
+            f"A function of the {found['against'].rpartition(',')[0]} explains "
+            f"{100 * found['share']:.0f} % of its variance."
+        )
+    if found["line_hz"] is not None and found["line_hz"] > SLOWEST_LINE:
+        sentences.append(
+            f"Strongest line of {found['drawn'][0]}: {found['line']:g} {found['unit']} at {found['line_hz']:g} Hz."
+        )
     if found["drawn"] == ["reference"]:
         sentences.append("No channel changes, only the reference does.")
     if found["drawn"][0].startswith("gyro"):
@@ -253,28 +179,44 @@ def _signature(effect: type[Effect], text: Description, found: Mapping[str, Any]
     return f"![{alt}](figures/{effect.name}.png)\n\n" + " ".join(sentences)
 
 
-def _rivals(numbers: Mapping[str, Any]) -> str:
+def _rivals(effect: type[Effect], numbers: Mapping[str, Any]) -> str:
     motions = numbers["motions"]
     if not motions:
         return (
             "It has no size that a motion could enlarge, and no column in the normal equations: it is found from the "
             "samples themselves before any fit, and computed rivals do not apply."
         )
-    rows = ["| motion | d′ | rivals: share explained, nats that remain |", "|---|---|---|"]
+    rows = ["| motion | d′ | rivals: share that each explains, and nats that remain |", "|---|---|---|"]
     for motion, one in motions.items():
         if one["detectability"] < _ANY:
-            rows.append(f"| {motion} | {one['detectability']:.2g} | does not show |")
+            rows.append(f"| {motion} | {one['detectability']:.1f} | does not show |")
             continue
         rivals = [_rival(*rival) for rival in one["rivals"]]
         more = one.get("more") or []
         cell = ", ".join(rivals) + (f", and {len(more)} more" if more else "")
         rows.append(f"| {motion} | {one['detectability']:.3g} | {cell or 'none'} |")
-    return "\n".join(rows) + f"\n\nBold: not separable in this motion (below {SEPARATED:g} nats). Others explain nine tenths or more, but not all."
+    notes = f"Bold: not separable in this motion (below {SEPARATED:g} nats). The others explain nine tenths or more."
+    if numbers.get("of_samples"):
+        notes = (
+            f"Computed for the example below, linear in the sizes of the rivals; those that would need a size beyond "
+            f"their limit are left out. A diagnosis looks for a fault of the samples before any fit. {notes}"
+        )
+    if effect.contained_in:
+        wider = _and([link(one) for one in sorted(effect.contained_in)])
+        notes += f" Whatever it does, {wider} can do too: no motion separates the two, and the narrower one is named."
+    return "\n".join(rows) + f"\n\n{notes}"
 
 
 def _rival(name: str, share: float, nats: float) -> str:
-    text = f"{_link(name)} {100 * share:.4g} %, {nats:.3g}"
+    text = f"{link(name)} {100 * share:.4g} %, {_nats(nats)}"
     return f"**{text}**" if nats < SEPARATED else text
+
+
+def _nats(value: float) -> str:
+    """Return nats with as many digits as matter."""
+    if value < LEAST:
+        return f"< {LEAST:g}"
+    return f"{value:.2g}" if value < SEPARATED else f"{value:.0f}" if value < MOST else f"> {MOST}"
 
 
 def _separation(text: Description, numbers: Mapping[str, Any]) -> str:
@@ -286,37 +228,38 @@ def _separation(text: Description, numbers: Mapping[str, Any]) -> str:
         rows.append("|---|" + "---|" * len(trials))
         for place, rival in enumerate(one["rivals"]):
             cells = [one["nats"][trial][place] for trial in trials]
-            shown = [f"**{cell:.3g}**" if cell < SEPARATED else f"{cell:.3g}" for cell in cells]
-            rows.append(f"| {_link(rival)} | {' | '.join(shown)} |")
+            shown = [f"**{_nats(cell)}**" if cell < SEPARATED else _nats(cell) for cell in cells]
+            rows.append(f"| {link(rival)} | {' | '.join(shown)} |")
         if one["separates"]:
-            sentence = f"Computed: *{EXPERIMENTS[one['separates']]}* separates it from every effect that some motion above confounds it with."
-        else:
             sentence = (
-                f"Computed: *{EXPERIMENTS[one['best']]}* separates it best. It stays inseparable from "
-                f"{_and([_link(rival) for rival in one['remaining']])} there."
+                f"Computed: *{EXPERIMENTS[one['separates']]}* separates it from every effect with which some motion "
+                "above confounds it."
             )
+        else:
+            remaining = _and([link(rival) for rival in one["remaining"]])
+            none = all(max(values) < SEPARATED for values in one["nats"].values())
+            best = f"*{EXPERIMENTS[one['best']]}* separates it best, but not from {remaining}."
+            sentence = f"Computed: {f'none of these separates it from {remaining}.' if none else best}"
         parts += ["\n".join(rows), sentence]
     return "\n\n".join(parts)
 
 
 def _trial(effect: type[Effect], text: Description, found: Mapping[str, Any] | None) -> str:
-    from effect_trials import simulate_command, twin_of
-
     lines = [f"```\n{simulate_command(effect, text.example)}"]
-    twin = twin_of(effect.name)
+    twin = "free.toml" if effect.name.startswith("gyro_") else twin_of(effect.name)
     lines[0] += f"\ngfimu diagnose hidden.parquet --twin {twin} --out diagnosis\n```"
     if effect.name.startswith("gyro_"):
-        lines.append('The twin has to be that of a free body: a copy of `cube12_turntable` with `source = "gyro"` in `[drive]`.')
-    lines.append(f"In a twin file it is a table `[[effect]]` with `name = \"{effect.name}\"` and the same parameters.")
+        lines.append('`free.toml` is a copy of the twin `cube12_turntable` with `source = "gyro"` in `[drive]`.')
+    lines.append(f'In a twin file it is a table `[[effect]]` with `name = "{effect.name}"` and the same parameters.')
     if isinstance(effect, type) and issubclass(effect, Unlisted):
         dependence = effect.dependence.name
         lines.append(
-            f'`verdict.json` names it `"effect": "unlisted"` with `"place": "{effect.grammar_place}"`, `"dependence": "{dependence}"` '
-            f'and `"name": "{effect.name}"`.'
+            f'`verdict.json` names it `"effect": "unlisted"` with `"place": "{effect.grammar_place}"`, '
+            f'`"dependence": "{dependence}"` and `"name": "{effect.name}"`.'
         )
     elif effect.name not in ("unknown", "proof_mass"):
         lines.append(f'`verdict.json` names it `"effect": "{effect.name}"`.')
-    if found is not None:
+    if found is not None and found["of"] == text.example:
         lines.append(f"What the diagnosis of this recording says: {_verdict(found)}.")
     return "\n\n".join(lines)
 
@@ -331,7 +274,11 @@ def _verdict(found: Mapping[str, Any]) -> str:
         beside = f", not distinguishable from {_and([f'`{rival}`' for rival in rivals])}" if rivals else ""
         causes.append(f"`{name}` (probability {one['probability']:.2f}{beside})")
     by = f" by {_and(causes)}" if causes else ""
-    share = f"; {100 * found['share']:.0f} % of the excess on held-out data is removed" if found.get("share") is not None else ""
+    share = (
+        f"; {100 * found['share']:.0f} % of the excess on held-out data is removed"
+        if found.get("share") is not None
+        else ""
+    )
     return f"*{found['verdict'].replace('_', ' ')}*{by}{share}"
 
 
@@ -342,13 +289,19 @@ def _on_rail(effect: type[Effect]) -> str:
     return f"{text.what}\n\n$$\n{lines}\n$$\n\n{text.experiment}"
 
 
-def _link(name: str) -> str:
+def link(name: str) -> str:
+    """Return an effect's name as a link to its page; ° marks one of the wider library."""
     mark = "°" if name in FURTHER_EFFECTS else ""
     return f"[{name}]({name}.md){mark}" if name in every_effect() else f"`{name}`"
 
 
 def _and(items: list[str]) -> str:
     return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}"
+
+
+def _plain(text: str) -> str:
+    """Return text with the marks of code as Markdown has them."""
+    return text.replace("``", "`")
 
 
 def _sentence(text: str) -> str:

@@ -37,7 +37,7 @@ from sim.scenarios import Scenario, simulate
 from sim.twin import Twin
 from sim.world import World
 
-__all__ = ["BODY", "CARRIAGE", "TABLE", "Rig", "Table", "data_table", "experiment_tables", "motion_tables"]
+__all__ = ["BODY", "CARRIAGE", "TABLE", "Rig", "Table", "data_table", "experiment_tables", "motion_tables", "table_of"]
 
 SIDE = np.array([np.pi / 2, 0.0, 0.0])
 SEED = 1
@@ -160,15 +160,16 @@ TABLE, BODY, CARRIAGE = _table_rig(), _body_rig(), _carriage_rig()
 
 def motion_tables(rig: Rig) -> dict[str, Table]:
     """Return what each standard motion of a rig says of its effects."""
-    return {name: _table(rig.twin, runs) for name, runs in rig.motions.items()}
+    return {name: table_of(rig.twin, runs) for name, runs in rig.motions.items()}
 
 
 def experiment_tables(rig: Rig) -> dict[str, Table]:
     """Return what each experiment says of the effects of a rig."""
-    return {name: _table(rig.twin, runs) for name, runs in rig.experiments.items()}
+    return {name: table_of(rig.twin, runs) for name, runs in rig.experiments.items()}
 
 
-def _table(twin: Twin, runs: Sequence[Any]) -> Table:
+def table_of(twin: Twin, runs: Sequence[Any]) -> Table:
+    """Return what some runs, diagnosed together, say of the effects of a twin."""
     stretches, point, duration, rate = _seen(twin, runs)
     names = _sized(twin, duration, rate, len(runs))
     signatures, contenders = plan_contenders(twin, names, duration=duration, sample_rate=rate, runs=len(runs))
@@ -215,7 +216,8 @@ def data_table(name: str, parameters: Mapping[str, Any]) -> dict[str, Any]:
     """Return the same for a fault of the samples, which has no size: what each effect explains of its example.
 
     The speed sweep is simulated without noise, with the fault in it. The share is that of the misfit, the drive and the
-    slow noise at their best, which one effect alone takes away, linear in its sizes.
+    slow noise at their best, which one effect alone takes away, linear in its sizes; an effect that would need a size
+    beyond its limit explains nothing.
     """
     (run,) = TABLE.experiments["sweep"]
     twin = TABLE.twin
@@ -229,11 +231,15 @@ def data_table(name: str, parameters: Mapping[str, Any]) -> dict[str, Any]:
     signatures, contenders = plan_contenders(twin, names, duration=run.duration, sample_rate=run.sample_rate)
     gram, score = normal_equations((stretch,), point, signatures)
     whole = float(linearise((stretch,), point).objective - linearise((plain,), point).objective)
-    rivals = {}
+    families, rivals = twin.families(), {}
     for one in contenders:
-        gains = []
+        sizes = families[one.name].sizes(twin.array)
+        limits = np.array([size.bound / size.prior_std for size in sizes])
+        best = 0.0
         for columns in one.alternatives:
             inner = gram[np.ix_(columns, columns)] + np.eye(len(columns)) / SCALES[-1] ** 2
-            gains.append(float(score[columns] @ np.linalg.solve(inner, score[columns])))
-        rivals[one.name] = (max(gains) / whole, 0.5 * max(whole - max(gains), 0.0))
+            size = np.linalg.solve(inner, score[columns])
+            if np.all(np.abs(size) <= limits):
+                best = max(best, float(score[columns] @ size))
+        rivals[one.name] = (best / whole, 0.5 * max(whole - best, 0.0))
     return {"detectability": float(np.sqrt(whole)), "rivals": rivals}

@@ -1,7 +1,7 @@
 """The change that each effect makes in a fixed reference run: as numbers, and as three small panels.
 
-The reference run is the scenario `speed_sweep` on the twin `cube12_turntable`, without noise, while the board warms from
-25 to 28 °C; of a linear axis, a free body or a pendulum it is the scenario of that rig.
+The reference run is the scenario `speed_sweep` on the twin `cube12_turntable`, without noise, while the board warms
+from 25 to 28 °C; of a linear axis, a free body or a pendulum it is the scenario of that rig.
 """
 
 from __future__ import annotations
@@ -23,21 +23,20 @@ from PIL import Image
 
 from gfimu.geometry.array import AccelerometerArray
 from sim.effects import make_effect
-from sim.effects.unlisted import TURNS
+from sim.effects.grammar import TURNS
 from sim.motion import SpinState
 from sim.scenarios import Scenario
-from sim.truth import cube_state
 from sim.twin import Twin
 from sim.world import World
 
 __all__ = ["Signature", "draw", "reference_run_of", "signature"]
 
 GREY, COLOURS = "#787878", ("#2b87c4", "#d55e00", "#009e73")
-"""Of text, and of three lines: near Okabe and Ito's for the colour-blind; contrast at least 3 : 1 on white and black."""
+"""Of text, and of three lines: near Okabe and Ito's for the colour-blind; contrast 3 : 1 on white and black."""
 
 WARMING, WARMING_TIME = 3.0, 15.0  # K, s
 BINS = 40
-MOST_BYTES = 60_000
+COLOURS_KEPT = 160  # of a picture: with fewer the lines take each other's colour
 HIDDEN = 0.1
 """Share of its own change by which a channel must differ from another one to be drawn beside it."""
 LONGEST_STROKES = 25.0  # s: the run of a linear axis is shorter, that of a table longer
@@ -100,11 +99,12 @@ class Signature:
     def spectrum(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return frequencies, Hz, and amplitudes (m, k) of the change under a Hann window, the mean taken out."""
         window = np.hanning(len(self.t))[:, None]
-        amplitude = 2.0 * np.abs(np.fft.rfft((self.change - self.change.mean(axis=0)) * window, axis=0)) / window.sum()
+        change = self.change - self.change.mean(axis=0)
+        amplitude = 2.0 * np.abs(np.fft.rfft(change * window, axis=0)) / window.sum()
         return np.fft.rfftfreq(len(self.t), self.t[1] - self.t[0])[1:], amplitude[1:]
 
     def strongest_line(self) -> tuple[float, float]:
-        """Return frequency, Hz, and amplitude of the strongest line of the first channel, slower than a run left out."""
+        """Return frequency, Hz, and amplitude of the strongest line of the first channel, the slowest two left out."""
         frequency, amplitude = self.spectrum()
         place = int(np.argmax(amplitude[2:, 0])) + 2
         return float(frequency[place]), float(amplitude[place, 0])
@@ -142,6 +142,8 @@ def signature(name: str, parameters: Mapping[str, Any]) -> Signature:
     else:
         order = _unlike(change)
         names, drawn, unit = tuple(twin.array.channels[place] for place in order), change[:, order], "m/s²"
+    if name == "dropped_frames":
+        unit = "1 = lost"
     rms = {one: float(np.sqrt(np.mean(change[:, k] ** 2))) for k, one in enumerate(twin.array.channels)}
     rms = {one: value for one, value in rms.items() if value > SMALLEST}
     if np.any(np.abs(reference_change) > SMALLEST):
@@ -199,7 +201,9 @@ def _of_gyro(run: Scenario, t: NDArray[np.float64], effect: Any) -> Signature:
     rms = {f"gyro {axis}": float(np.sqrt(np.mean(change[:, k] ** 2))) for k, axis in enumerate("xyz")}
     first = now[:, order[0]]
     eta = _explained(change[:, order[0]], first)
-    return Signature(run.name, t, names, "rad/s", change[:, order], rms, f"rate about {names[0][-1]}, rad/s", first, eta)
+    return Signature(
+        run.name, t, names, "rad/s", change[:, order], rms, f"rate about {names[0][-1]}, rad/s", first, eta
+    )
 
 
 def _quantities(
@@ -237,7 +241,10 @@ def _explained(change: NDArray[np.float64], values: NDArray[np.float64]) -> floa
         return 0.0
     edges = np.unique(np.round(np.quantile(values, np.linspace(0.0, 1.0, BINS + 1)[1:-1]), 9))
     place = np.searchsorted(edges, np.round(values, 9), side="left")
-    return 1.0 - sum(float(np.sum((one - one.mean()) ** 2)) for k in np.unique(place) for one in [change[place == k]]) / whole
+    return (
+        1.0
+        - sum(float(np.sum((one - one.mean()) ** 2)) for k in np.unique(place) for one in [change[place == k]]) / whole
+    )
 
 
 def draw(found: Signature, path: Path) -> None:
@@ -276,4 +283,4 @@ def draw(found: Signature, path: Path) -> None:
         figure.savefig(memory, dpi=130)
         plt.close(figure)
     memory.seek(0)
-    Image.open(memory).quantize(48, method=Image.Quantize.FASTOCTREE).save(path, optimize=True)
+    Image.open(memory).quantize(COLOURS_KEPT, method=Image.Quantize.FASTOCTREE).save(path, optimize=True)

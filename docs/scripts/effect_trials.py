@@ -1,11 +1,12 @@
 """Hide the example of each effect in a simulated recording, and write down what a diagnosis makes of it.
 
-The recording is that of the command on the effect's page: ideal chips with the noise of the data sheet. A diagnosis takes
-ten seconds to some minutes, so that the verdicts are stored and not part of the quick tests.
+The recording is that of the command on the effect's page: ideal chips with the noise of the data sheet. A diagnosis
+takes ten seconds to some minutes, so that the verdicts are stored and not part of the quick tests.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -18,7 +19,7 @@ from sim.effects.base import Effect
 from sim.scenarios import Scenario, simulate
 from sim.twin import Twin
 
-__all__ = ["changes_of", "simulate_command", "trial", "twin_of"]
+__all__ = ["changes_of", "run_of", "simulate_command", "trial", "twin_of"]
 
 IDEAL = ("sensor.errors=false", "sensor.bandwidth=false")
 SEED = 1
@@ -42,31 +43,34 @@ def _toml(value: Any) -> str:
 
 def simulate_command(effect: type[Effect], example: Mapping[str, Any]) -> str:
     """Return the command line that simulates a recording with an effect."""
-    run = _run_of(effect.name)
+    run = run_of(effect.name)
     options = [f"  --set '{one}'" if " " in one else f"  --set {one}" for one in changes_of(effect, example)]
     return " \\\n".join([f"gfimu simulate {run} --seed {SEED} --out hidden.parquet", *options])
 
 
-def _run_of(name: str) -> str:
+def run_of(name: str) -> str:
     """Return the scenario to hide an effect in; a gyro is hidden in the hand, where all axes turn."""
     return "hand" if name.startswith("gyro_") else reference_run_of(name)
 
 
 def twin_of(name: str) -> str:
     """Return the shipped twin that diagnoses the run of an effect; of a free body it is made from that of the table."""
-    return {"linear_axis": "linear_axis", "pendulum": "pendulum"}.get(_run_of(name), "cube12_turntable")
+    return {"linear_axis": "linear_axis", "pendulum": "pendulum"}.get(run_of(name), "cube12_turntable")
 
 
 def trial(effect: type[Effect], example: Mapping[str, Any]) -> dict[str, Any]:
-    """Return verdict, causes with their probability, and share of the excess removed of the hidden example."""
+    """Return verdict, causes with their probability, and share of the excess removed of the hidden example.
+
+    A recording that a diagnosis refuses has the verdict ``refused`` and its message.
+    """
     twin = Twin.load(twin_of(effect.name))
-    if _run_of(effect.name) == "hand":
+    if run_of(effect.name) == "hand":
         twin = replace(twin, drive_source="gyro")
     try:
-        recording = simulate(Scenario.load(_run_of(effect.name), changes=changes_of(effect, example)), seed=SEED)
+        recording = simulate(Scenario.load(run_of(effect.name), changes=changes_of(effect, example)), seed=SEED)
         found = diagnose([recording], twin)
     except GfimuError as error:
-        return {"verdict": "refused", "message": str(error)}
+        return {"of": dict(example), "verdict": "refused", "message": str(error)}
     verdict = found.to_dict()
     causes = [
         {
@@ -79,7 +83,8 @@ def trial(effect: type[Effect], example: Mapping[str, Any]) -> dict[str, Any]:
     ]
     share = verdict.get("gain", {}).get("share_of_excess_removed")
     return {
+        "of": dict(example),
         "verdict": verdict["verdict"],
         "causes": causes,
-        "share": None if share is None else round(float(share), 3),
+        "share": None if share is None or math.isnan(share) else round(float(share), 3),
     }

@@ -22,7 +22,7 @@ from firmware_bridge.adxl345.device import Adxl345
 from firmware_bridge.adxl345.registers import TICKS_PER_SECOND, Adxl345Options, LineFault
 from firmware_bridge.loop.physics import Conversions, RestPhysics
 from firmware_bridge.lpc1768.build import IMAGES, image_path
-from gfimu.errors import GfimuError, InputError
+from gfimu.errors import GfimuError, InputError, did_you_mean
 from gfimu.optional_packages import missing, require
 
 __all__ = ["BoardProcess", "emulator_available", "require_emulator"]
@@ -78,7 +78,10 @@ class BoardProcess:
         require_emulator()
         path = image_path(str(image)) if str(image) in IMAGES else Path(image)
         if not path.is_file():
-            raise InputError(f"{image}: no such image; valid: {', '.join(IMAGES)}, or the path of an ELF file")
+            raise InputError(
+                f"{image}: no such image; valid: {', '.join(IMAGES)}, or the path of an ELF file"
+                f"{did_you_mean(str(image), IMAGES)}"
+            )
         compiled = not missing("ziglang")
         self.fast = (compiled if fast is None else fast) and not trace and not lose_every
         self._conversions = conversions or RestPhysics()
@@ -234,6 +237,7 @@ def _work(
     array: str,
 ) -> None:
     """Serve one board until the pipe closes."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the first process that is started has it unblocked again
     import numpy as np
 
     from firmware_bridge.board.worker import Worker

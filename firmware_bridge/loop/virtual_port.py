@@ -5,12 +5,14 @@ from __future__ import annotations
 import contextlib
 import os
 import select
+import signal
 import socket
 import sys
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
-from types import TracebackType
 from typing import Protocol
 
 from firmware_bridge.adxl345.registers import TICKS_PER_SECOND
@@ -240,15 +242,18 @@ class _Buffer:
             self.refused += excess
 
 
-class _Interrupted:
-    """Ends a loop at Ctrl-C without a traceback."""
-
-    def __enter__(self) -> None: ...
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> bool:
-        return kind is KeyboardInterrupt
+@contextmanager
+def _ask_to_stop() -> Iterator[Callable[[], bool]]:
+    """Turn Ctrl-C into a question, so that it does not come in the middle of a call to the board's process."""
+    asked = threading.Event()
+    if threading.current_thread() is not threading.main_thread():
+        yield asked.is_set
+        return
+    before = signal.signal(signal.SIGINT, lambda *_: asked.set())
+    try:
+        yield asked.is_set
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def serve(
@@ -285,14 +290,18 @@ def serve(
     received = 0
     end = None if duration_s is None else first + round(duration_s * TICKS_PER_SECOND)
     line = _Buffer(port)
-    with _Interrupted():
-        while (end is None or now < end) and not (stop is not None and stop()):
+    with _ask_to_stop() as interrupted:
+
+        def over() -> bool:
+            return interrupted() or (stop is not None and stop())
+
+        while (end is None or now < end) and not over():
             target = now + round((_SLICE_S if realtime else _FAST_SLICE_S) * TICKS_PER_SECOND)
             before = board.baud()
             now = board.run_until(target if end is None else min(target, end))
             line.put(as_received(board.take_sent()[0], before, port.baud or before)[0])
             line.pass_on(0.0 if realtime else _SLICE_S)
-            while not realtime and line.waiting and not (stop is not None and stop()):
+            while not realtime and line.waiting and not over():
                 line.pass_on(_SLICE_S)
             if realtime:
                 line.forget()

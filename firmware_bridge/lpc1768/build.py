@@ -15,7 +15,7 @@ from pathlib import Path
 import tomli_w
 
 from firmware_bridge.lpc1768.elf import ElfImage
-from gfimu.errors import GfimuError, InputError
+from gfimu.errors import GfimuError, InputError, did_you_mean
 from gfimu.files.atomic_file import atomic_path, write_text
 from gfimu.optional_packages import require
 
@@ -95,7 +95,8 @@ class BuildReport:
 def image_path(name: str = "gfimu") -> Path:
     """Path of a committed image; raises `InputError` that lists the images."""
     if name not in IMAGES:
-        raise InputError(f"unknown image {name!r}; valid: {', '.join(IMAGES)}, or the path of an ELF file")
+        remedy = did_you_mean(name, IMAGES)
+        raise InputError(f"unknown image {name!r}; valid: {', '.join(IMAGES)}, or the path of an ELF file{remedy}")
     return FOLDER / "image" / f"{name}.elf"
 
 

@@ -74,6 +74,11 @@ class Front(PlottedResult):
         The two objectives.
     points : tuple of FrontPoint
         The arrays.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> gfimu.optimize(4, most_chips=6, pareto=("chips", "gdop")).to_pandas()  # doctest: +SKIP
     """
 
     names: tuple[str, str]

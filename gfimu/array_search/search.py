@@ -28,7 +28,7 @@ from gfimu.geometry.array import AccelerometerArray
 from gfimu.geometry.dilution import gdop_lower_bound
 from gfimu.geometry.kinematics import require_all_motions
 from gfimu.geometry.scoring import Score, score, score_panels
-from gfimu.results import Panel, PlottedResult, text_column
+from gfimu.results import Panel, PlottedResult
 from gfimu.short_repr import short_repr
 
 __all__ = ["Found", "SearchResult", "best_design", "optimize", "search"]
@@ -70,6 +70,13 @@ class SearchResult(PlottedResult):
         Its figure.
     certificate : Certificate or None
         A proven lower bound of it.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> found = gfimu.optimize(4, restarts=2, seed=1)
+    >>> print(f"{found.score.gdop:.4f}, at least {found.gdop_lower_bound:.4f}")
+    1.0607, at least 1.0607
     """
 
     array: AccelerometerArray
@@ -86,18 +93,15 @@ class SearchResult(PlottedResult):
 
     def to_columns(self) -> dict[str, NDArray[Any]]:
         """Return the array, one row per channel: position of its chip, m, and sensing axis, body frame."""
-        array = self.array
-        columns: dict[str, NDArray[Any]] = {"channel": text_column(array.channels)}
-        for name, values in (("position_{}_m", array.positions), ("axis_{}", array.axes)):
-            columns |= {name.format(axis): values[:, place] for place, axis in enumerate("xyz")}
-        return columns
+        return self.array.to_columns()
 
     def _heading(self) -> str:
         return f"Array found: {self.array.name}, {len(self.array.chips)} chips"
 
     def _facts(self) -> list[tuple[str, str]]:
+        best = (self.objective.meaning, f"{self.value:.4g} {self.objective.unit}".strip())
         found = [
-            (self.objective.meaning, f"{self.value:.4g} {self.objective.unit}".strip()),
+            *([] if self.objective.name == "gdop" else [best]),
             ("GDOP", f"{self.score.gdop:.4f} (lower bound {self.gdop_lower_bound:.4f})"),
             ("condition number κ", f"{self.score.condition_number:.4f}"),
             ("starts that end there", f"{self.agreeing} of {self.starts}"),

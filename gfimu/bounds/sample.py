@@ -103,6 +103,12 @@ def rate_bound(array: AccelerometerArray, omega: ArrayLike, noise_std: float) ->
     ndarray, shape (..., 3)
         Least standard deviation of an unbiased estimate, rad/s; infinite for a component that one sample does not
         determine (all three at ω = 0, and always for arrays with no null space). The sign of ω is taken as known.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> gfimu.rate_bound(gfimu.AccelerometerArray.load("cube12"), [0.0, 0.0, 6.28], 0.0287).round(4)
+    array([0.0323, 0.0323, 0.0162])
     """
     information = rate_information(array, omega, noise_std)
     values, vectors = np.linalg.eigh(information)  # (..., 3), (..., 3, 3)

@@ -74,6 +74,13 @@ def calibrate_array(
     ------
     InputError
         If the poses or the motion do not suffice, or the data are faulty.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> poses = gfimu.simulate("calibration_poses", seed=2)
+    >>> gfimu.calibrate_array(poses, poses.array)
+    Calibration(array, 12 channels in m/s², 60 parameters, 3 directions undetermined)
     """
     warnings = list(check_gravity(gravity))
     ordered, rest, poses, found = _poses(recording, array, rest_threshold, min_rest_s)

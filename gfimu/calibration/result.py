@@ -109,6 +109,15 @@ class Calibration(PlottedResult):
         What looked wrong in the data.
     statistics : mapping of str to float or str
         Residual RMS, number of poses, redundancy, variance factor, rest threshold and so on; units in the keys.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> calibration = gfimu.calibrate("array", gfimu.simulate("calibration_poses", seed=2))
+    >>> calibration
+    Calibration(array, 12 channels in m/s², 60 parameters, 3 directions undetermined)
+    >>> print(f"{calibration.value('a1_b_x'):.3f} ± {calibration.std_of('a1_b_x'):.3f} m/s²")
+    -0.371 ± 0.001 m/s²
     """
 
     method: str
@@ -446,6 +455,11 @@ def load_calibration(path: str | Path) -> Calibration:
     ------
     InputError
         If the file is missing, not JSON, not a calibration, or of another format version.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> gfimu.load_calibration("cal.json").apply(run)  # doctest: +SKIP
     """
     file = check_input(path)
     try:

@@ -269,6 +269,11 @@ class Certificate(TableResult):
         Program and version.
     format, format_version : constant
         What the file is.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> gfimu.certificate("cal.json").term("a11_K0")  # doctest: +SKIP
     """
 
     item: str

@@ -4,35 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from gfimu.cli.command import CommandApp
 from gfimu.cli.output import print_json, print_paths, print_table, print_text, progress
-from gfimu.cli.shared_options import JsonOption
+from gfimu.cli.shared_options import JsonOption, shared
+
+if TYPE_CHECKING:
+    from gfimu.commands.benchmark import Judgement
 
 __all__ = ["register"]
 
-SetsOption = Annotated[
-    list[str] | None,
-    typer.Option("--sets", metavar="SET", help="Set; may be repeated. All that are drawn by default."),
-]
-SplitOption = Annotated[
-    str, typer.Option("--split", metavar="dev|test", help="Worlds to develop on, or those of the published table.")
-]
-LimitOption = Annotated[
-    int | None, typer.Option("--limit", min=1, help="Only so many worlds of each set, which stand in random order.")
-]
-DataOption = Annotated[
-    Path | None, typer.Option("--data", metavar="DIR", help="Folder of the measured data, for the set real.")
-]
+SetsOption = Annotated[list[str] | None, shared("--sets")]
+SplitOption = Annotated[str, shared("--split")]
+LimitOption = Annotated[int | None, shared("--limit", min=1)]
+DataOption = Annotated[Path | None, shared("--data")]
 
 
 def register(app: typer.Typer) -> None:
     """Add the commands."""
-    group = typer.Typer(
+    group = CommandApp(
         help="Measure how well a method names what a simulation gets wrong: fixed worlds, a judge, baselines.\n\n"
-        "Example: gfimu benchmark run my_method.py:answer --out mine, then gfimu benchmark judge mine",
+        "A method is a Python function, or a program in any language that reads the worlds as files and writes its "
+        "answers as lines of JSON.\n\nExamples\n--------\ngfimu benchmark run my_method.py:answer --out mine\n"
+        "gfimu benchmark judge mine --out mine.jsonl",
         no_args_is_help=True,
     )
     group.command(name="list")(_list)
@@ -46,7 +43,11 @@ def register(app: typer.Typer) -> None:
 def _list(json: JsonOption = False) -> None:
     """List the sets of the benchmark, their sizes and licences, and the methods that come with it.
 
-    Example: gfimu benchmark list
+    Writes nothing.
+
+    Examples
+    --------
+    gfimu benchmark list
     """
     from gfimu.commands.benchmark import benchmark_list
 
@@ -69,35 +70,47 @@ def _worlds(
 ) -> None:
     """Write worlds as plain files, for a method in any language: a recording and a twin each, no truth.
 
-    Example: gfimu benchmark worlds --out worlds --sets own --limit 5 --format csv
+    Examples
+    --------
+    gfimu benchmark worlds --out worlds
+    # A few, as text
+    gfimu benchmark worlds --out worlds --sets own --limit 5 --format csv
     """
     from gfimu.commands.benchmark import worlds
 
     with progress("worlds", total=1.0) as show:
         found = worlds(out, sets=sets or [], split=split, limit=limit, form=form, progress=_shown("worlds", show))
     if json:
-        print_json({"folder": out, "worlds": found})
+        files = {"worlds": out, "schema": out / "answer.schema.json"}
+        print_json({"worlds": [str(folder.relative_to(out)) for folder in found], "files": files})
         return
     print_text(f"{len(found)} worlds")
     print_paths([("worlds", out), ("schema of answers", out / "answer.schema.json")])
 
 
 def _run(
-    method: Annotated[str, typer.Argument(help="FILE.py:function, or a method that comes with the benchmark.")],
-    out: Annotated[Path, typer.Option("--out", help="Folder to write; one that was begun is gone on with.")],
+    method: Annotated[
+        str, typer.Argument(metavar="METHOD", help="FILE.py:function, or a method that comes with the benchmark.")
+    ],
+    out: Annotated[Path, typer.Option("--out", help="Folder to write; one that was begun is continued.")],
     sets: SetsOption = None,
     split: SplitOption = "dev",
     limit: LimitOption = None,
     name: Annotated[str, typer.Option("--name", help="Name in tables; that of the file by default.")] = "",
-    workers: Annotated[int | None, typer.Option("--workers", help="Processes; by default one per processor.")] = None,
+    workers: Annotated[int | None, shared("--workers")] = None,
     data: DataOption = None,
     json: JsonOption = False,
 ) -> None:
     """Run a method over worlds; a second call goes on where one ended.
 
-    Example: gfimu benchmark run my_method.py:answer --out mine
+    After Ctrl-C the finished worlds stay; the same command goes on with the others.
 
-    Example: gfimu benchmark run greedy_bic --out greedy --sets own --limit 10
+    Examples
+    --------
+    # A method of one's own, on the worlds to develop on
+    gfimu benchmark run my_method.py:answer --out mine
+    # A baseline, on a few worlds
+    gfimu benchmark run greedy_bic --out greedy --sets own --limit 10
     """
     from gfimu.commands.benchmark import run
 
@@ -123,7 +136,9 @@ def _run(
 
 
 def _judge(
-    answers: Annotated[list[Path], typer.Argument(help="Answers (.jsonl, .jsonl.xz), or folders of runs.")],
+    answers: Annotated[
+        list[Path], typer.Argument(metavar="ANSWERS...", help="Answers (.jsonl, .jsonl.xz), or folders of runs.")
+    ],
     out: Annotated[
         Path | None, typer.Option("--out", help="File to write: judged answers (.jsonl or .jsonl.xz).")
     ] = None,
@@ -135,13 +150,17 @@ def _judge(
 ) -> None:
     """Judge answers by the truth: right, in a set, unknown, missed, wrong; sizes, prediction, time.
 
-    Example: gfimu benchmark judge mine --out mine.jsonl
+    Examples
+    --------
+    gfimu benchmark judge mine --out mine.jsonl
+    # Answers of a program in another language, to some worlds of the split
+    gfimu benchmark judge answers.jsonl --partial
     """
     from gfimu.commands.benchmark import judge
 
     found = judge([*answers], out=out, partial=partial, data=data)
     if json:
-        print_json(found.to_dict())
+        print_json(found.to_dict() | {"files": {} if out is None else {"judged": out}})
         return
     _print(found)
     if out is not None:
@@ -149,26 +168,29 @@ def _judge(
 
 
 def _table(
-    results: Annotated[list[Path], typer.Argument(help="Judged answers, as judge --out writes them.")],
-    markdown: Annotated[bool, typer.Option("--markdown", help="Print a table in Markdown.")] = False,
+    results: Annotated[
+        list[Path], typer.Argument(metavar="RESULTS...", help="Judged answers, as judge --out writes them.")
+    ],
     json: JsonOption = False,
 ) -> None:
     """Summarise judged answers of one or several methods, with 95 % intervals.
 
-    Example: gfimu benchmark table mine.jsonl greedy.jsonl
+    Writes nothing.
+
+    Examples
+    --------
+    gfimu benchmark table mine.jsonl greedy.jsonl
     """
     from gfimu.commands.benchmark import table
 
     found = table([*results])
     if json:
         print_json(found.to_dict())
-    elif markdown:
-        typer.echo(found.to_markdown(), nl=False)
     else:
         _print(found)
 
 
-def _print(found: Any) -> None:
+def _print(found: Judgement) -> None:
     """Print a table per set, a column per method."""
     from sim.benchmark.table import COLUMNS
 
@@ -176,9 +198,7 @@ def _print(found: Any) -> None:
         columns = [one.row()[1:] for one in found.summaries if one.set_name == name]
         first, *rows = zip(COLUMNS[1:], *columns, strict=True)
         print_table(name, first, rows)
-    print_text(
-        "points: right 1, tied, in part or in a set of k 1/2 or 1/k, unknown 0.25, missed 0, wrong name or false alarm -1"
-    )
+    print_text("points: right 1, in part or in a set 0.5 or less, unknown 0.25, missed 0, wrong name or false alarm -1")
 
 
 def _shown(title: str, show: Any) -> Callable[[int, int], None]:

@@ -42,6 +42,11 @@ class GfimuCommand(TyperCommand):
             _suggest_option(error, self.get_params(ctx))
             raise
 
+    def collect_usage_pieces(self, ctx: Any) -> list[str]:
+        """Return the words of the usage line: an argument stands as its metavar."""
+        arguments = [param for param in self.get_params(ctx) if param.param_type_name == "argument"]
+        return ["[OPTIONS]", *(param.metavar or param.name.upper() for param in arguments)]
+
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Write the help."""
         write_help(self, ctx, formatter)

@@ -52,7 +52,7 @@ def _drift(
     ),
     gravity: Annotated[float, shared("--gravity")] = 9.80665,
     monte_carlo: Annotated[int, typer.Option(help="Number of nonlinear Monte Carlo runs; 0 for none.")] = 0,
-    seed: Annotated[int, shared("--seed")] = 0,
+    seed: Annotated[int, shared("--seed", min=0)] = 0,
     axis: AxisOption = None,
     axis_point: AxisPointOption = (0.0, 0.0, 0.0),
     hub: HubOption = "fixed",

@@ -65,7 +65,7 @@ def _optimize(
     restarts: Annotated[
         int | None, typer.Option("--restarts", help="Most random starts; 40 by default, fewer once ten agree.")
     ] = None,
-    seed: Annotated[int | None, shared("--seed", more="; by default that of the brief, or 0")] = None,
+    seed: Annotated[int | None, shared("--seed", min=0, more="; by default that of the brief, or 0")] = None,
     out: Annotated[Path | None, typer.Option("--out", help="Array file to write (.toml).")] = None,
     picture: Annotated[Path | None, shared("--picture", more=": the array in its volume")] = None,
     front: Annotated[
@@ -114,7 +114,7 @@ def _optimize(
         _print_front(result)
     else:
         _print_result(result)
-    print_paths(files.items())
+    print_paths((f"the {what}", path) for what, path in files.items())
 
 
 def _print_result(result: SearchResult) -> None:

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 __all__ = ["console", "plain", "print_json", "print_paths", "print_table", "print_text", "progress"]
 
+_ENDLESS = 10_000  # numerical: columns, more than any table has
+
 
 def console(*, stderr: bool = False) -> Console:
     """Return a console that takes no text for markup."""
@@ -60,17 +62,41 @@ def print_text(text: str, *, style: str = "", stderr: bool = False) -> None:
 def print_table(
     title: str, header: Sequence[str], rows: Iterable[Sequence[object]], *, note: str = "", left: int = 1
 ) -> None:
-    """Print a table for people: the first ``left`` columns hold words, numbers go to the right."""
+    """Print a table for people: the first ``left`` columns hold words, numbers go to the right.
+
+    On a terminal too narrow for its words and numbers, each row is printed as a list of its cells.
+    """
+    from rich.measure import Measurement
     from rich.table import Table
     from rich.text import Text
 
+    screen, cells = console(), [[str(cell) for cell in row] for row in rows]
     table = Table(title=Text(title), title_justify="left", title_style="bold", caption=Text(note) if note else None)
     table.caption_justify = "left"
     for place, name in enumerate(header):
         table.add_column(Text(name), justify="left" if place < left else "right", overflow="fold")
-    for row in rows:
-        table.add_row(*[Text(str(cell)) for cell in row])
-    console().print(table)
+    for row in cells:
+        table.add_row(*[Text(cell) for cell in row])
+    least = Measurement.get(screen, screen.options.update(max_width=_ENDLESS), table).minimum
+    if screen.is_terminal and least > screen.width:
+        _print_as_lists(title, header, cells, note)
+    else:
+        screen.print(table)
+
+
+def _print_as_lists(title: str, header: Sequence[str], rows: Iterable[Sequence[str]], note: str) -> None:
+    """Print the rows of a table one after another, a line for each cell that is not empty."""
+    from rich.text import Text
+
+    screen = console()
+    screen.print(Text(title, style="bold"))
+    for first, *others in rows:
+        screen.print(Text(f"{header[0]}: {first}" if header[0] else first))
+        for name, cell in zip(header[1:], others, strict=True):
+            if cell:
+                screen.print(Text(f"  {name}: {cell}" if name else f"  {cell}"))
+    if note:
+        screen.print(Text(note, style="dim italic"))
 
 
 def print_paths(paths: Iterable[tuple[str, str | Path]]) -> None:

@@ -75,6 +75,7 @@ SHARED: dict[str, Shared] = {
     "--by": Shared(f"Factor to group by; {_REPEATED}. A range is cut into fifths.", "FACTOR"),
     "--calibration": Shared("Calibration to apply first (.json, from gfimu calibrate).", "FILE"),
     "--chips": Shared("Number of chips", "N"),
+    "--data": Shared("Folder of the measured data, for the set real.", "DIR"),
     "--direction-std-rad": Shared("With --axis: how exactly its direction is known, rad.", "RAD", KNOWN_AXIS),
     "--duration": Shared("Length of the run, s", "S"),
     "--force": Shared("Go on where the checks of units, time, array and channels refuse the file"),
@@ -90,13 +91,14 @@ SHARED: dict[str, Shared] = {
         "Image: gfimu, selfcheck, or an ELF or .bin file.", "IMAGE", complete=completion.words("gfimu", "selfcheck")
     ),
     "--inclination-rad": Shared(
-        "Angle between --axis and the vertical; else from the data, or 0 (a free hub: π/2) where there are none.",
+        "Angle between --axis and the vertical, rad; else from the data, or 0 (a free hub: π/2) where there are none.",
         "RAD",
         KNOWN_AXIS,
     ),
     "--json": Shared("Print one JSON object instead of tables; gfimu schema COMMAND describes it."),
     "--keep-faulty": Shared("Use channels that contradict the others, too"),
     "--latitude": Shared("Latitude, degrees", "DEG"),
+    "--limit": Shared("Only so many worlds of each set, which stand in random order.", "N"),
     "--lever-std-m": Shared("With --axis: how exactly each chip's place is known, m.", "M", KNOWN_AXIS),
     "--map": Shared("Column map: a name, or a TOML file (gfimu inspect writes one).", "MAP", _FOREIGN, completion.maps),
     "--map-set": Shared(
@@ -118,7 +120,17 @@ SHARED: dict[str, Shared] = {
     "--rrd": Shared("Rerun recording to write (.rrd)", "FILE"),
     "--scenario": Shared("Scenario: a name, or a scenario file (.toml)", "SCENARIO", complete=completion.scenarios),
     "--seed": Shared("Seed of everything left to chance", "N"),
+    "--sets": Shared(
+        f"Set of worlds; {_REPEATED}. All that are drawn by default.",
+        "SET",
+        complete=completion.words("own", "independent", "unlisted", "dcmotor", "real"),
+    ),
     "--speed-rad-s": Shared("Angular rate, rad/s", "RAD/S"),
+    "--split": Shared(
+        "Worlds to develop on (dev), or those of the published table (test).",
+        "SPLIT",
+        complete=completion.words("dev", "test"),
+    ),
     "--table": Shared("Table, topic or member of a file that holds several.", "NAME", _FOREIGN),
     "--twin": Shared(
         "Twin, what the simulation assumes: a name, or a twin file (.toml).", "TWIN", complete=completion.twins

@@ -74,7 +74,7 @@ def _tolerance(
         bool, typer.Option("--closed-form", help="First order alone, without simulated units.")
     ] = False,
     units: Annotated[int, typer.Option(help="Number of simulated units.")] = 200,
-    seed: Annotated[int, shared("--seed")] = 0,
+    seed: Annotated[int, shared("--seed", min=0)] = 0,
     workers: Annotated[int | None, shared("--workers")] = None,
     picture: PictureOption = None,
     json: JsonOption = False,

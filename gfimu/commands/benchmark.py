@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from gfimu.errors import InputError, unknown_name
 from gfimu.files.outputs import OutputFile, OutputFolder, writes
+from gfimu.optional_packages import require
 
 if TYPE_CHECKING:
     from sim.benchmark.answer import Answer
@@ -76,7 +77,8 @@ class BenchmarkRun:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content for JSON."""
-        return {**vars(self), "folder": str(self.folder), "answers": str(self.answers)}
+        kept = {name: getattr(self, name) for name in ("method", "worlds", "failed")}
+        return {"folder": str(self.folder), **kept, "files": {"answers": str(self.answers)}}
 
 
 @dataclass(frozen=True)
@@ -117,6 +119,7 @@ def methods() -> dict[str, str]:
 
 def benchmark_list() -> BenchmarkList:
     """List the sets of the benchmark, their sizes and licences, and the methods that come with it."""
+    require("gfimu benchmark", "mujoco")
     from sim.benchmark.release import RELEASE, SETS, SPLITS, cases
     from sim.benchmark.truth_file import release_hash
 
@@ -168,6 +171,8 @@ def worlds(
     import json
 
     from gfimu.files.atomic_file import write_text
+
+    require("gfimu benchmark", "mujoco")
     from sim.benchmark.answer import answer_schema
     from sim.benchmark.release import cases
     from sim.benchmark.truth_file import task_of
@@ -231,6 +236,7 @@ def run(
     InputError
         If the method, a set or the split is not there, or the folder holds another run.
     """
+    require("gfimu benchmark", "mujoco")
     from sim.benchmark.answer import write_answers
     from sim.benchmark.methods import answers_of, benchmark_plan, benchmark_work, load_method
     from sim.sweep.dataset import Dataset
@@ -279,6 +285,7 @@ def judge(
     InputError
         If a file is wrong, a world is not of the release, or has two answers by one method.
     """
+    require("gfimu benchmark", "mujoco")
     from sim.benchmark.judge import judge as judge_answers
     from sim.benchmark.judged_file import write_judged
     from sim.benchmark.table import summaries

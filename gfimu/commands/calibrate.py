@@ -146,6 +146,13 @@ def calibrate(
     InputError
         If the method is unknown, an option has no use with it, a recording is refused by its checks, the data are
         faulty, the poses don't suffice, or an output can't be written where it is asked for.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> poses = gfimu.simulate("calibration_poses", seed=2)
+    >>> gfimu.calibrate("array", poses)
+    Calibration(array, 12 channels in m/s², 60 parameters, 3 directions undetermined)
     """
     from gfimu.calibration.check_poses import check_on_poses
     from gfimu.calibration.methods import CalibrationTask, RateTable, run_calibration

@@ -35,6 +35,11 @@ class CampaignResult(PlottedResult):
         How many cases failed, by the reason.
     groups : tuple of Group
         Quantiles of each result by the values of the factors.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> gfimu.campaign("plan.toml", out="campaign").to_pandas()  # doctest: +SKIP
     """
 
     folder: Path
@@ -119,6 +124,11 @@ def campaign(
     InputError
         If the plan is wrong, a folder is needed or holds another campaign, Dask is not installed, or no scheduler
         answers.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> gfimu.campaign("plan.toml", out="campaign").plot()  # doctest: +SKIP
     """
     from gfimu.commands.campaign_cases import KINDS, check_factors
     from gfimu.errors import InputError

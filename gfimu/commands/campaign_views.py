@@ -36,6 +36,11 @@ class CampaignStatus:
         How many cases failed, by the reason.
     runs : tuple of Run
         Processes that run it now.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> gfimu.campaign_status("campaign").done  # doctest: +SKIP
     """
 
     folder: Path
@@ -79,6 +84,11 @@ class CampaignTable(PlottedResult):
         Share of each result's variance that each factor causes.
     seed_shares : dict of str to float
         Share of each result's variance that the seeds cause; empty without repeats.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> gfimu.campaign_table("campaign", by=["sensor.range_g"]).to_pandas()  # doctest: +SKIP
     """
 
     groups: tuple[Group, ...]
@@ -111,7 +121,9 @@ class CampaignTable(PlottedResult):
         }
 
 
-_PICTURE = OutputFile("a picture", (".png", ".svg", ".html"), dict.fromkeys((".png", ".svg", ".html"), ("matplotlib",)))
+_PICTURE = OutputFile(
+    "a picture", (".png", ".svg", ".html"), dict.fromkeys((".png", ".svg", ".html"), ("matplotlib",)), any_case=True
+)
 
 
 def group_columns(groups: Sequence[Group]) -> dict[str, NDArray[Any]]:
@@ -151,6 +163,11 @@ def campaign_status(folder: str | Path) -> CampaignStatus:
     ------
     InputError
         If the folder holds no campaign, or a file in it is damaged.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> gfimu.campaign_status("campaign").done  # doctest: +SKIP
     """
     from sim.sweep.dataset import Dataset
     from sim.sweep.design import Design
@@ -180,6 +197,11 @@ def campaign_table(folder: str | Path, *, by: Sequence[str] = (), csv: str | Pat
     ------
     InputError
         If the folder holds no campaign, a file in it is damaged, or there is no such factor.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> gfimu.campaign_table("campaign").to_pandas()  # doctest: +SKIP
     """
     from sim.sweep.dataset import Dataset
     from sim.sweep.design import Design
@@ -213,6 +235,11 @@ def campaign_plot(folder: str | Path, *, out: str | Path, result: Sequence[str] 
     ------
     InputError
         If the folder holds no campaign or no result yet, a file in it is damaged, or there is no such result.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> gfimu.campaign_plot("campaign", out="campaign.png")  # doctest: +SKIP
     """
     from sim.sweep.dataset import Dataset
     from sim.sweep.design import Design

@@ -35,16 +35,22 @@ def catalogue(kind: str) -> dict[str, str]:
     ------
     InputError
         If the kind is unknown.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> sorted(gfimu.catalogue("twins"))
+    ['cube12_turntable', 'linear_axis', 'mimu4444_free', 'pendulum', 'wheel_pair']
     """
     from gfimu.errors import unknown_name
 
     if kind not in KINDS:
         raise unknown_name("kind", kind, KINDS)
     if kind == "effects":
-        from sim.effects import CARRIAGE_EFFECTS, EFFECTS, FURTHER_EFFECTS, SIMULATED_EFFECTS, added_effects
+        from sim.effects import added_effects
+        from sim.effects.catalogue import every_effect
 
-        every = EFFECTS | FURTHER_EFFECTS | CARRIAGE_EFFECTS | SIMULATED_EFFECTS | added_effects()
-        return {name: family.summary for name, family in every.items()}
+        return {name: family.summary for name, family in (every_effect() | added_effects()).items()}
     if kind == "formats":
         from gfimu.importing.readers import readers
         from gfimu.recording.formats import formats
@@ -67,6 +73,12 @@ def show(name: str) -> str:
     ------
     InputError
         If nothing has that name, the file is wrong, or the recording carries no array.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> print(gfimu.show("rest").splitlines()[0])
+    # The unit at rest: noise, biases, drift. Turned on its side with: --set 'mounting_rotvec_rad=[1.5708, 0, 0]'.
     """
     from gfimu.errors import unknown_name
     from gfimu.files.model_files import find_model, list_models
@@ -76,10 +88,17 @@ def show(name: str) -> str:
     for kind in _FILES:
         if name in list_models(kind):
             return find_model(kind, name).read_text(encoding="utf-8")
-    effects = catalogue("effects")
-    if name in effects:
-        return f"{name}: {effects[name]}\n"
+    if name in catalogue("effects"):
+        return _shown_effect(name)
     raise unknown_name("name", name, [one for kind in (*_FILES, "effects") for one in catalogue(kind)])
+
+
+def _shown_effect(name: str) -> str:
+    """Return what an effect is, its formula, parameters, rivals, and the experiment that separates it."""
+    from sim.effects import added_effects
+    from sim.effects.catalogue import essence, every_effect
+
+    return essence((every_effect() | added_effects())[name])
 
 
 def _shown_file(name: str) -> str:
@@ -124,6 +143,12 @@ def new(
     ------
     InputError
         If the kind is unknown, the file or folder is there already, or a file is asked for where a folder is written.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> print(gfimu.new("array").splitlines()[0])
+    #:schema ./array.schema.json
     """
     from gfimu.commands.file_kinds import file_schema
     from gfimu.errors import InputError, unknown_name

@@ -77,6 +77,11 @@ def certificate(
     InputError
         If the calibration can't be read, is of a gyro or without covariance, the other is of another unit or other
         chips, or the folder can't be written where it is asked for.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> gfimu.certificate("cal.json", item="unit 7").to_pandas()  # doctest: +SKIP
     """
     from gfimu.certification.comparison import compare as compared
     from gfimu.certification.page import write_certificate

@@ -43,6 +43,14 @@ def check(
     ------
     InputError
         If a recording can't be read, is too short, or lacks the reference that drives the twin.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> run = gfimu.simulate("paper_run", seed=1)
+    >>> seen = gfimu.check(run, "cube12_turntable")
+    >>> seen.findings
+    ()
     """
     from gfimu.commands.opened import as_runs, as_source, as_twin
     from gfimu.diagnosis.design.run_check import check_runs

@@ -80,6 +80,11 @@ def convert(
     ------
     InputError
         If the source can't be read, or the target can't be written where it is asked for.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> gfimu.convert("log.csv", "run.parquet", column_map="phyphox")  # doctest: +SKIP
     """
     from gfimu.commands.export_array import export_array
     from gfimu.commands.export_calibration import export_calibration

@@ -32,6 +32,11 @@ class DemoResult:
         The table: questions, answers, what to compare them with.
     files : mapping of str to Path
         What was written, by its meaning.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> gfimu.demo("gfimu-demo").rows  # doctest: +SKIP
     """
 
     seed: int
@@ -66,6 +71,11 @@ def demo(
     ------
     InputError
         If the folder can't be written.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> gfimu.demo("gfimu-demo")  # doctest: +SKIP
     """
     require("gfimu demo", "mujoco", "rerun", "matplotlib")
     from gfimu.commands.demo_steps import STEPS, Demo

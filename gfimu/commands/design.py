@@ -92,6 +92,11 @@ def design(
     InputError
         If effects are missing, unknown or have no size, the twin is not driven by a table, the limits leave no
         motion, or the output can't be written where it is asked for.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> gfimu.design("cube12_turntable", ["tacho_scale", "scale_factor"]).separates  # doctest: +SKIP
     """
     import numpy as np
 

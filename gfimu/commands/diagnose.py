@@ -101,6 +101,14 @@ def diagnose(
     InputError
         If a recording is too short, lacks the reference that drives the twin, is refused by its checks, or is held
         out and fitted both; or the folder can't be written.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> run = gfimu.simulate("rest", seed=1)
+    >>> found = gfimu.diagnose(run, twin="cube12_turntable")  # doctest: +SKIP
+    >>> found.verdict, found.gain.share_of_excess_removed  # doctest: +SKIP
+    >>> found.plot()  # doctest: +SKIP
     """
     from gfimu.commands.opened import as_calibration, as_runs, as_source, as_twin
     from gfimu.joining import displaced_reference
@@ -199,6 +207,11 @@ def write_report(diagnosis: Diagnosis, folder: str | Path) -> Path:
     ------
     InputError
         If the folder can't be written.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> gfimu.write_report(gfimu.diagnose("run.parquet", "cube12_turntable"), "diagnosis")  # doctest: +SKIP
     """
     import tomli_w
 

@@ -37,6 +37,12 @@ class Drift(PlottedResult):
         Nonlinear Monte Carlo of the same errors.
     seed : int
         Its seed.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> gfimu.drift("cube12", time=10.0, noise_ug=290.0).budget.total_std.round(1)
+    array([27.8, 27.8,  3.3])
     """
 
     budget: DriftBudget
@@ -108,6 +114,13 @@ class EquivalentErrors(TableResult):
     earth_rate_deg_h, earth_share_m : float or None
         Horizontal part of the Earth's rate, °/h, and the position error that it makes in a unit that takes the Earth
         for still, m; None without a latitude.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> found = gfimu.drift_from_position((6.4, 0.0, 0.0), time=30.0)
+    >>> print(f"{found.rate_drift_deg_h[1]:.1f} °/h about y, or {found.bias_mg[0]:.2f} mg")
+    29.9 °/h about y, or 1.45 mg
     """
 
     position_m: tuple[float, float, float]
@@ -170,6 +183,13 @@ def drift_from_position(
     -----
     GF-IMU paper, eq. 30 inverted: δr = ½ b t² + (d × g) t³/6, so that a drift about +y moves the unit along +x and one
     about +x along −y.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> found = gfimu.drift_from_position((6.4, 0.0, 0.0), time=30.0)
+    >>> print(f"{found.rate_drift_deg_h[1]:.1f} °/h")
+    29.9 °/h
     """
     from gfimu.motion.earth import EarthRotation
     from gfimu.motion.equivalent_errors import equivalent_p_bias, equivalent_rate_drift
@@ -243,6 +263,13 @@ def drift(
         If there is no error to budget, or an argument is out of range.
     GeometryError
         If the array can't see all six motions.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> found = gfimu.drift("cube12", time=10.0, noise_ug=290.0)
+    >>> print(f"{found.budget.total_std[0]:.1f} m")
+    27.8 m
     """
     import numpy as np
 
@@ -310,6 +337,13 @@ def axis_drift(
     ------
     InputError
         If there is no error to budget, no axis, or an argument is out of range.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> found = gfimu.axis_drift("wheel_pair", time=10.0, noise_ug=290.0, rate=5.0)
+    >>> [one.name for one in found.terms]
+    ['white noise']
     """
     from gfimu.commands.known_axis import turning_axis
     from gfimu.commands.opened import as_array

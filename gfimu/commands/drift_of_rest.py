@@ -63,6 +63,14 @@ def drift_of_rest(
         If no rest is long enough, the recording is refused by its checks, or the picture can't be written.
     GeometryError
         If the array can't see all six motions.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> rest = gfimu.simulate("rest", seed=3, changes=["duration_s=30"])
+    >>> found = gfimu.drift_of_rest(rest, time=2.0)
+    >>> len(found.start_s) > 1
+    True
     """
     from gfimu.commands.opened import as_calibrated_run, as_source, name_of
     from gfimu.errors import naming

@@ -145,6 +145,15 @@ def estimate(
         As `gfimu.motion.estimation.estimate`, or if an output can't be written where it is asked for.
     GeometryError
         If the array can't see all six motions; the message names those it can't.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> run = gfimu.simulate("paper_run", seed=1)
+    >>> gfimu.estimate(run, rest_bias=True)
+    Estimate(cube12, integrate, 3000 samples, 29.99 s at 100 Hz)
+    >>> gfimu.estimate((run.t_s, run.readings), "cube12", rest_bias=True).omega.shape
+    (3000, 3)
     """
     from gfimu.commands.known_axis import turning_axis
     from gfimu.geometry.turning_axis import AxisUncertainty

@@ -76,6 +76,11 @@ def impact(
     InputError
         If the recording can't be read, is refused by its checks, has gaps, is sampled too slowly for the class, holds
         no impact or begins within it, or an output can't be written where it is asked for.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> gfimu.impact("drop.csv", array="cube12").plot()  # doctest: +SKIP
     """
     from gfimu.commands.opened import as_calibrated_run, as_source, name_of
     from gfimu.crash.event import ImpactSettings, measure_impact

@@ -31,6 +31,11 @@ def inspect(file: str | Path, *, table: str = "", out: str | Path | None = None)
     ------
     InputError
         If the file can't be read, or holds no accelerations that a map to write could name.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> gfimu.inspect("log.csv")  # doctest: +SKIP
     """
     from gfimu.files.atomic_file import write_text
     from gfimu.importing import inspect_file

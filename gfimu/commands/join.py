@@ -58,6 +58,11 @@ def join(
     InputError
         If a file can't be read, the channels' checks refuse them, the reference does not change, or the two don't seem
         to belong together.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> gfimu.join("accelerometers.csv", "tacho.csv", out="run.parquet")  # doctest: +SKIP
     """
     from gfimu.commands.opened import as_array, as_source, name_of
     from gfimu.importing import load_map

@@ -87,6 +87,12 @@ def live(
         If array or rate are stated nowhere, the rate is not positive, the source can't be opened or its first line that
         is no comment doesn't name the columns. While lines come: if the first seconds show that units, times, array or
         order of the channels are wrong.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> for line in gfimu.live("cube12", 100.0, source=lines):  # doctest: +SKIP
+    ...     print(line)
     """
     import numpy as np
 

@@ -80,6 +80,13 @@ def noise(
     InputError
         If the recording can't be read, is refused by its checks or never rests, or holds counts where an axis is given,
         or an output can't be written where it is asked for.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> found = gfimu.noise(gfimu.simulate("rest", seed=1))
+    >>> list(found.models)[:3]
+    ['a11', 'a12', 'a13']
     """
     from gfimu.calibration.run_file import open_calibrated, open_uncalibrated
     from gfimu.commands.known_axis import known_axis, turning_axis

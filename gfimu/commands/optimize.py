@@ -104,6 +104,13 @@ def optimize(
         If no such array sees all six motions, or none is free of ω² where that is asked.
     InputError
         If an argument or the brief is wrong, the chips don't fit, or an output can't be written where it is asked for.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> found = gfimu.optimize(4, restarts=2, seed=1)
+    >>> print(f"GDOP {found.score.gdop:.4f}")
+    GDOP 1.0607
     """
     import numpy as np
 

@@ -114,6 +114,11 @@ def record(
     InputError
         If the port can't be opened, nothing that is a frame comes, no board is found, or an output can't be written
         where it is asked for.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> gfimu.record("/dev/ttyACM0", "run.parquet", duration=30.0)  # doctest: +SKIP
     """
     from firmware_bridge.frames.commands import set_range, set_rate
     from firmware_bridge.host.mounting.fit import FirstSamples

@@ -14,6 +14,11 @@ if TYPE_CHECKING:
 __all__ = ["schema", "schema_names"]
 
 _RESULTS: dict[str, tuple[str, ...]] = {
+    "benchmark judge": ("benchmarks.BenchmarkJudged",),
+    "benchmark list": ("benchmarks.BenchmarkListed",),
+    "benchmark run": ("benchmarks.BenchmarkRun",),
+    "benchmark table": ("benchmarks.BenchmarkJudged",),
+    "benchmark worlds": ("benchmarks.BenchmarkWorlds",),
     "calibrate": ("calibrations.Calibrated",),
     "campaign": ("campaigns.Campaign",),
     "campaign plot": ("campaigns.CampaignPlot",),

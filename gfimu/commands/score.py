@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from gfimu.commands.former_arguments import former_arguments
 from gfimu.results import Panel, PlottedResult, Series, result_html
+from gfimu.short_repr import joined
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -28,11 +29,9 @@ __all__ = ["Scores", "score"]
 _COLUMNS = (
     "array",
     "channels",
-    "length_unit_m",
     "condition_number",
     "gdop",
     "gdop_joint",
-    "null_space_rank",
     "rate_bound_z_rad_s",
     "sigma_rate_filter_rad_s",
 )
@@ -42,8 +41,14 @@ _FASTEST = 1e6  # rad/s
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
-class Scores(list["Score | AxisBounds"], PlottedResult):
-    """Scores of arrays side by side, in the order in which the arrays were given.
+@dataclass(frozen=True)
+class Scores(PlottedResult):
+    """Scores of arrays side by side, in the order in which the arrays were given; counts and iterates like a list.
+
+    Parameters
+    ----------
+    scores : tuple of Score or AxisBounds
+        One of each array.
 
     Examples
     --------
@@ -54,6 +59,21 @@ class Scores(list["Score | AxisBounds"], PlottedResult):
     >>> scores.best.name
     'corners8'
     """
+
+    scores: tuple[Score | AxisBounds, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.scores)
+
+    def __iter__(self) -> Iterator[Score | AxisBounds]:
+        return iter(self.scores)
+
+    def __getitem__(self, place: int) -> Score | AxisBounds:
+        return self.scores[place]
+
+    def __repr__(self) -> str:
+        figures = [f"{one.name} {one.gdop:.4g}" for one in self.rigid] + [one.array for one in self.about_axis]
+        return joined(self, figures)
 
     @property
     def rigid(self) -> tuple[Score, ...]:
@@ -192,6 +212,12 @@ def score(
         If an array can't see all six motions; the message names the motions.
     InputError
         If an array is unknown or an argument is out of range.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> [f"{one.name} {one.gdop:.3f}" for one in gfimu.score(["cube12", "corners8"]).rigid]
+    ['cube12 1.061', 'corners8 0.750']
     """
     from gfimu.commands.known_axis import known_axis, turning_axis
     from gfimu.commands.opened import as_array
@@ -218,7 +244,7 @@ def score(
     scores: Iterator[Score] = iter(())
     if seeing:
         scores = iter(score_arrays(seeing, length_unit_m=length_unit_m, omega_rad_s=omega, noise_m_s2=noise_m_s2))
-    found = Scores()
+    found: list[Score | AxisBounds] = []
     if len(seeing) < len(given_axes):  # the others don't wait for a compiler
         from gfimu.known_axis.accuracy.predicted import PredictedRun
 
@@ -237,7 +263,7 @@ def score(
         found.append(_about_axis(array, stands, run, speed_rad_s, noise_m_s2))
     if not uncertainty.exact and len(seeing) == len(given_axes):
         raise InputError(f"{next(iter(uncertainty.to_dict()))} is of a known axis; give the axis too (--axis)")
-    return found
+    return Scores(tuple(found))
 
 
 def _about_axis(

@@ -54,6 +54,13 @@ def simulate(
     ------
     InputError
         If the scenario or a change is wrong, or an output can't be written where it is asked for.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> run = gfimu.simulate("paper_run", seed=1)
+    >>> run.readings.shape
+    (3000, 12)
     """
     from gfimu.errors import InputError
     from sim.scenarios import Scenario
@@ -74,12 +81,21 @@ def simulate(
 
 
 def _draw(rrd: str | Path, run: Scenario, recording: Recording) -> None:
+    """Draw what was simulated: on its turntable, about a level or inclined axis, on a carriage, or free."""
+    from dataclasses import replace
+
     from gfimu.visual import write_run
-    from sim.drawing import rig_drawing
+    from sim.drawing import array_on_axis, rig_drawing
     from sim.truth import known_motion
 
-    shapes = None if run.free else rig_drawing(run.world)
-    write_run(rrd, _in_si(recording), run.array, known=known_motion(recording), shapes=shapes, title=run.name)
+    array, known = run.array, known_motion(recording)
+    hung = None if run.free else array_on_axis(run.world)
+    if hung is not None:
+        array, lift = hung
+        known = replace(known, position=known.position + lift)
+    on_table = not run.free and hung is None and run.world.slide is None
+    shapes = rig_drawing(run.world) if on_table else None
+    write_run(rrd, _in_si(recording), array, known=known, shapes=shapes, title=run.name)
 
 
 def _in_si(recording: Recording) -> Recording:

@@ -54,6 +54,13 @@ class ToleranceResult(PlottedResult):
         Simulated units, by calibration; empty where none were asked for.
     seed : int
         Seed of the simulated units.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> found = gfimu.tolerance("cube12", closed_form=True)
+    >>> sorted(found.budgets)
+    ['none', 'poses', 'poses+rest', 'rest']
     """
 
     array: str
@@ -218,6 +225,13 @@ def tolerance(
         If an argument is out of range, or the array or the motion do not allow a calibration.
     GeometryError
         If the array can't see all six motions.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> found = gfimu.tolerance("cube12", closed_form=True)
+    >>> found.budgets["poses+rest"].quantities["omega"].unit
+    'rad/s'
     """
     from gfimu.commands.opened import as_array
     from gfimu.commands.tolerance_units import UnitTask, simulate_units

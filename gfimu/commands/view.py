@@ -75,6 +75,12 @@ def view(
         If the file can't be read, its checks refuse it, or the output can't be written where it is asked for.
     GfimuError
         If this machine has no display, or the viewer fails; the message says what to do instead.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> gfimu.view("run.parquet")  # doctest: +SKIP
+    >>> gfimu.view(run, out="run.rrd")  # doctest: +SKIP
     """
     require("gfimu view", "rerun")
     from gfimu.commands.known_axis import turning_axis

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gfimu.errors import InputError
+from gfimu.errors import InputError, did_you_mean
 
 __all__ = ["CHANNEL_CLASSES", "STANDARDS", "channel_filter", "filter_coefficients"]
 
@@ -56,7 +56,8 @@ def filter_coefficients(
     makes four poles without phase.
     """
     if standard not in STANDARDS:
-        raise InputError(f"standard {standard!r}; choose among {', '.join(STANDARDS)}")
+        remedy = did_you_mean(standard, STANDARDS)
+        raise InputError(f"standard {standard!r}; choose among {', '.join(STANDARDS)}{remedy}")
     if not (math.isfinite(channel_class) and channel_class > 0.0):
         raise InputError(f"channel class {channel_class:g}; give one above 0, such as 1000, 600, 180 or 60")
     needed = _SAMPLES_PER_CLASS * channel_class

@@ -89,6 +89,11 @@ class Impact(PlottedResult):
         p, α, ω from shortly before time zero on; its time is zero there.
     recording : Recording
         The channels, zeroed and filtered, in the same time.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> gfimu.impact("drop.csv", array="cube12").peak_p_m_s2  # doctest: +SKIP
     """
 
     time_zero_s: float

@@ -1,5 +1,6 @@
 """`gfimu.world_model` by its former name, for simulations that implement it from here."""
 
+from gfimu.lazy_names import former_name
 from gfimu.world_model import (
     BasisUnits,
     BodyModel,
@@ -29,3 +30,5 @@ __all__ = [
     "bound_of",
     "is_of_one_recording",
 ]
+
+former_name(__name__, "gfimu.world_model", removed="0.4")

@@ -64,15 +64,18 @@ class OutputFile:
         File name extensions that its writer supports.
     needs : mapping of str to tuple of str
         Optional packages (`gfimu.optional_packages`) that writing takes, by extension; none for an extension not here.
+    any_case : bool
+        Whether capital letters in the extension are as good.
     """
 
     what: str
     suffixes: tuple[str, ...]
     needs: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    any_case: bool = False
 
     def check_suffix(self, path: Path) -> None:
         """Raise `InputError` for an extension that the writer does not support."""
-        if path.suffix in self.suffixes:
+        if (path.suffix.lower() if self.any_case else path.suffix) in self.suffixes:
             return
         if len(self.suffixes) == 1:
             raise InputError(f"{path}: {self.what} ends in {self.suffixes[0]}; name it so")
@@ -82,7 +85,7 @@ class OutputFile:
 
     def check_packages(self, path: Path) -> None:
         """Raise `MissingPackageError` where a package is not installed that writes files of this extension."""
-        require(f"{path}: {self.what}", *self.needs.get(path.suffix, ()))
+        require(f"{path}: {self.what}", *self.needs.get(path.suffix.lower(), ()))
 
     def files(self, path: Path) -> list[Path]:
         """Return the files that will be replaced."""
@@ -134,7 +137,9 @@ SCENARIO = OutputFile("a scenario file", (".toml",))
 TOML_FILE = OutputFile("a TOML file", (".toml",))
 KALIBR = OutputFile("a Kalibr file", (".yaml", ".yml"))
 JSON_SCHEMA = OutputFile("a JSON schema", (".json",))
-PICTURE = OutputFile("a picture", (".png", ".svg", ".pdf"), dict.fromkeys((".png", ".svg", ".pdf"), ("matplotlib",)))
+PICTURE = OutputFile(
+    "a picture", (".png", ".svg", ".pdf"), dict.fromkeys((".png", ".svg", ".pdf"), ("matplotlib",)), any_case=True
+)
 
 
 def check_parent(path: Path) -> None:

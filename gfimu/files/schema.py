@@ -17,7 +17,7 @@ from typing import Annotated, Any, TypeVar
 import msgspec
 from msgspec import inspect as types
 
-from gfimu.errors import InputError, nearest_name
+from gfimu.errors import InputError, did_you_mean, nearest_name
 
 __all__ = ["NotNegative", "Positive", "Table", "Triple", "about", "read", "tagged", "without_none"]
 
@@ -241,8 +241,7 @@ def _unknown(key: str, valid: Sequence[str]) -> str:
 
 def _nearest(word: Any, valid: Sequence[Any]) -> str:
     """Return the remedy for a slip of the pen; empty where no valid word is near."""
-    near = nearest_name(str(word), [str(one) for one in valid], _ROUGHLY)
-    return f"; did you mean {near!r}?" if near else ""
+    return did_you_mean(str(word), [str(one) for one in valid], _ROUGHLY)
 
 
 def _missing(key: str, info: types.Type) -> str:

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import tomli_w
@@ -22,8 +22,13 @@ from gfimu.files.model_files import find_model, read_toml
 from gfimu.files.schema import read
 from gfimu.geometry.array_file import ArrayFile, ChipTable
 from gfimu.geometry.turning_axis import TurningAxis
+from gfimu.optional_packages import require
 from gfimu.parts.files import add_part_file, is_part_file
+from gfimu.results import TableResult, drawn_chips, text_column
 from gfimu.short_repr import joined, short_repr
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = ["OMEGA_PRODUCTS", "AccelerometerArray", "Chip"]
 
@@ -53,6 +58,13 @@ class Chip:
         Output data rate that this chip is set to, Hz; None: that of the scenario.
     own_clock : bool
         Whether the chip samples by a clock of its own.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> chip = gfimu.AccelerometerArray.load("cube12").chips[0]
+    >>> chip.name, chip.channels
+    ('a1', ('a11', 'a12', 'a13'))
     """
 
     name: str
@@ -85,7 +97,7 @@ class Chip:
 
 
 @dataclass(frozen=True)
-class AccelerometerArray:
+class AccelerometerArray(TableResult):
     """A rigid set of accelerometer chips.
 
     Parameters
@@ -102,6 +114,15 @@ class AccelerometerArray:
         Text of the part files that are not in ``models/parts``, by the name that the chips use.
     turning_axis : TurningAxis, optional
         The axis about which alone the array turns, where it is known.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> cube = gfimu.AccelerometerArray.load("cube12")
+    >>> cube
+    AccelerometerArray('cube12', 4 chips (adxl345), 12 channels)
+    >>> cube.regression_matrix.shape
+    (12, 6)
     """
 
     name: str
@@ -114,6 +135,43 @@ class AccelerometerArray:
     def __repr__(self) -> str:
         parts = ", ".join(dict.fromkeys(chip.part for chip in self.chips))
         return joined(self, [repr(self.name), f"{len(self.chips)} chips ({parts})", f"{self.n_channels} channels"])
+
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """Return one row per channel: its chip and part, position of the chip, m, and sensing axis, body frame."""
+        chips = [self.chips[place] for place in self.chip_of_channel]
+        return {
+            "channel": text_column(self.channels),
+            "chip": text_column(chip.name for chip in chips),
+            "part": text_column(chip.part for chip in chips),
+            **{f"position_{axis}_m": self.positions[:, place] for place, axis in enumerate("xyz")},
+            **{f"axis_{axis}": self.axes[:, place] for place, axis in enumerate("xyz")},
+        }
+
+    def _table_metadata(self) -> dict[str, Any]:
+        return {"array": self.name}
+
+    def _heading(self) -> str:
+        return f"Array {self.name}"
+
+    def _facts(self) -> list[tuple[str, str]]:
+        return [("what it is", self.description)] if self.description else []
+
+    def plot(self, figure: Figure | None = None) -> Figure:
+        """Draw the chips with their sensing axes in 3-D, body frame, lengths in mm.
+
+        Parameters
+        ----------
+        figure : Figure, optional
+            Where to draw; a new figure by default.
+
+        Raises
+        ------
+        MissingPackageError
+            If matplotlib is not installed.
+        """
+        require("plot", "matplotlib")
+        chips = [(chip.name, chip.position, chip.axes) for chip in self.chips]
+        return drawn_chips(self.name, chips, figure)
 
     @cached_property
     def channels(self) -> tuple[str, ...]:

@@ -32,6 +32,13 @@ def gdop(positions: ArrayLike, axes: ArrayLike | None = None, *, length_unit_m: 
     -------
     ndarray, shape (m,)
         Infinite for geometries of rank < 6.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> cube = gfimu.AccelerometerArray.load("cube12")
+    >>> gfimu.gdop(cube.chip_positions, length_unit_m=0.05).round(4).tolist()
+    [1.0607]
     """
     from gfimu.geometry.kernels.dilution import gdop_of_axes, gdop_of_triads  # numba: scoring does not wait for it
 

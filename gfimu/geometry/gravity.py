@@ -44,6 +44,12 @@ def local_gravity(latitude_deg: float, height_m: float = 0.0) -> float:
     ------
     InputError
         If the latitude or height is outside its range.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> print(f"{gfimu.local_gravity(52.0, 80.0):.4f} m/s²")
+    9.8122 m/s²
     """
     if not -90.0 <= latitude_deg <= 90.0:
         raise InputError(f"latitude {latitude_deg:g}° is outside −90…90; give it in degrees")

@@ -155,6 +155,13 @@ def specific_force(array: AccelerometerArray, p: ArrayLike, alpha: ArrayLike, om
     -------
     ndarray, shape (n, c)
         Readings of ideal sensors, m/s².
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> cube = gfimu.AccelerometerArray.load("cube12")
+    >>> gfimu.specific_force(cube, [0.0, 0.0, 9.81], [0.0, 0.0, 0.0], [0.0, 0.0, 2.0]).shape
+    (1, 12)
     """
     motion = np.concatenate(np.broadcast_arrays(*np.atleast_2d(alpha, p)), axis=-1)  # (n, 6)
     return motion @ array.regression_matrix.T + omega_products(np.atleast_2d(omega)) @ array.centripetal_matrix.T
@@ -169,6 +176,12 @@ def pseudo_inverse(array: AccelerometerArray) -> NDArray[np.float64]:
     ------
     GeometryError
         If the array can't see all six motions.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> gfimu.pseudo_inverse(gfimu.AccelerometerArray.load("cube12")).shape
+    (6, 12)
     """
     require_all_motions(array)
     return _left_inverse(array.regression_matrix, array.length_unit)
@@ -211,6 +224,15 @@ def closed_form(
     ------
     GeometryError
         If the array is another geometry.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import gfimu
+    >>> cube = gfimu.AccelerometerArray.load("cube12")
+    >>> level = np.tile(cube.axes @ [0.0, 0.0, 9.81], (3, 1))
+    >>> round(float(gfimu.closed_form(cube, level).p[0, 2]), 6)
+    9.81
     """
     from gfimu.geometry.kernels.alternate_corners import sum_alternate_corners
 
@@ -241,6 +263,15 @@ def motion_from_readings(
     ------
     GeometryError
         If the array can't see all six motions, or leaves ω² terms and ``omega`` is not given.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import gfimu
+    >>> cube = gfimu.AccelerometerArray.load("cube12")
+    >>> level = np.tile(cube.axes @ [0.0, 0.0, 9.81], (3, 1))
+    >>> round(float(gfimu.motion_from_readings(cube, level).p[0, 2]), 6)
+    9.81
     """
     rows = _reading_matrix(array, readings)
     rates = None if omega is None else _rate_matrix(omega, len(rows))
@@ -276,6 +307,15 @@ def joint_form(array: AccelerometerArray, readings: ArrayLike) -> JointEstimate:
     ------
     GeometryError
         If α or p can't be separated from the products of ω.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import gfimu
+    >>> cube = gfimu.AccelerometerArray.load("cube12")
+    >>> level = np.tile(cube.axes @ [0.0, 0.0, 9.81], (3, 1))
+    >>> round(float(gfimu.joint_form(cube, level).p[0, 2]), 6)
+    9.81
     """
     rows = _reading_matrix(array, readings)
     inverse, seen = _joint_inverse(array)
@@ -310,6 +350,12 @@ def null_space(array: AccelerometerArray) -> NullSpace:
     ------
     GeometryError
         If the array can't see all six motions.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> gfimu.null_space(gfimu.AccelerometerArray.load("cube12")).rank
+    6
     """
     require_all_motions(array)
     scale = np.array([array.length_unit] * 3 + [1.0] * 3)

@@ -84,6 +84,13 @@ class Score(PlottedResult):
         Cramér–Rao bound of one sample on the components of ω; infinite where one sample doesn't determine it.
     protection : Protection, optional
         Least faults of its channels that are found.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> score = gfimu.score("cube12").best
+    >>> print(f"κ {score.condition_number:.4f}, GDOP {score.gdop:.4f}")
+    κ 1.4142, GDOP 1.0607
     """
 
     name: str

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.errors import InputError
+from gfimu.errors import InputError, did_you_mean
 from gfimu.files.schema import read
 from gfimu.geometry.array_file import MountingTable, TurningAxisTable
 from gfimu.short_repr import short_repr
@@ -91,6 +91,12 @@ class TurningAxis:
         Angle between the axis and the vertical, rad; None if it is to be estimated.
     uncertainty : AxisUncertainty
         How exactly axis, places, orientations and biases of the chips are known; exactly by default.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> gfimu.AccelerometerArray.load("wheel_pair").turning_axis.direction
+    array([0., 0., 1.])
     """
 
     direction: NDArray[np.float64]
@@ -139,7 +145,7 @@ class TurningAxis:
                 f"{source}: direction and point must hold three finite numbers, the direction not all zero"
             )
         if hub not in HUBS:
-            raise InputError(f"{source}: unknown hub {hub!r}; valid: {', '.join(HUBS)}")
+            raise InputError(f"{source}: unknown hub {hub!r}; valid: {', '.join(HUBS)}{did_you_mean(hub, HUBS)}")
         if inclination is not None and not 0.0 <= inclination <= np.pi:
             raise InputError(f"{source}: inclination {inclination!r} rad; give an angle from 0 (upright) to π")
         return cls(vector / length, place, hub, inclination, uncertainty or AxisUncertainty())

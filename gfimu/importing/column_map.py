@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
 import msgspec
 
-from gfimu.errors import InputError
+from gfimu.errors import InputError, did_you_mean
 from gfimu.files.input_file import is_ordinary
 from gfimu.files.model_files import find_model, list_models, read_toml
 from gfimu.importing.map_keys import FOR_ALL, complete, set_map_key
@@ -107,6 +108,11 @@ class ColumnMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     Channels have the names of an array's sensing axes (a11, a12, a13, a21 …), references those of a recording
     (tacho_rad_s, angle_rad, gyro_x_rad_s …).
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> gfimu.convert("log.csv", column_map="phyphox")  # doctest: +SKIP
     """
 
     name: Annotated[str, _Meta(description="Name of the map.")]
@@ -162,7 +168,10 @@ class ColumnMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
                 raise InputError(f"{source}: {name} has both a time and rate_hz of its own; keep one")
         for name, spec in self.reference.items():
             if name not in REFERENCE_KINDS:
-                raise InputError(f"{source}: unknown reference {name!r}; valid: {', '.join(REFERENCE_KINDS)}")
+                raise InputError(
+                    f"{source}: unknown reference {name!r}; valid: {', '.join(REFERENCE_KINDS)}"
+                    f"{did_you_mean(name, REFERENCE_KINDS)}"
+                )
             factor_of(spec.unit, REFERENCE_KINDS[name], where=f"{source}: reference {name}")
         if self.array:
             from gfimu.geometry.array import AccelerometerArray
@@ -271,9 +280,16 @@ def _plain_words(text: str) -> str:
     if "unknown field" in words:
         table = {"time": TimeSpec, "text": TextSpec, "": ColumnMap}.get(where, ColumnSpec)
         keys = (*table.__struct_fields__, *(FOR_ALL if table is ColumnMap else ()))
-        words = words.replace("contains unknown field", "has no key") + f"; valid: {', '.join(keys)}"
+        near = did_you_mean(_quoted(words), keys)
+        words = words.replace("contains unknown field", "has no key") + f"; valid: {', '.join(keys)}{near}"
     elif "Invalid enum value" in words and where.startswith("drop"):
-        words += f"; valid: {', '.join(get_args(DropKind))}"
+        words += f"; valid: {', '.join(get_args(DropKind))}{did_you_mean(_quoted(words), get_args(DropKind))}"
     elif where.startswith("drop"):
         words += f"; give one or more of {', '.join(get_args(DropKind))}"
     return f"{where}: {words}" if where else words
+
+
+def _quoted(words: str) -> str:
+    """Return the first word in quotes."""
+    found = re.search("[`'](.*?)[`']", words)
+    return found[1] if found else ""

@@ -79,6 +79,11 @@ class Inspection(TableResult):
         Triads of accelerations.
     is_own : bool
         Whether it is a recording of gfimu's, which needs no map.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> gfimu.inspect("log.csv").fitting  # doctest: +SKIP
     """
 
     source: str

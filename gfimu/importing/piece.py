@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.errors import InputError
+from gfimu.errors import InputError, did_you_mean
 from gfimu.importing.clock import Times, times_of
 from gfimu.importing.column_map import REFERENCE_KINDS, ColumnMap, ColumnSpec, TimeSpec
 from gfimu.importing.notation import factor_of
@@ -220,9 +220,11 @@ def _table(raw: RawFile, chosen: ColumnMap) -> RawTable:
     fewest = min(range(len(candidates)), key=lambda place: len(lacking[place]))
     has = ", ".join(repr(name) for name in list(candidates[fewest].columns)[:12])
     others = [name for name in fitting_maps(raw) if name != chosen.name]
+    near = did_you_mean(lacking[fewest][0].strip("'"), candidates[fewest].columns)
     hint = f"; it looks like --map {others[0]}" if others else "; gfimu inspect prints a map to start from"
     raise InputError(
-        f"{raw.source}: map {chosen.name!r} needs column {', '.join(lacking[fewest])}; the file has {has}{hint}"
+        f"{raw.source}: map {chosen.name!r} needs column {', '.join(lacking[fewest])}; "
+        f"the file has {has}{near.rstrip('?')}{hint}"
     )
 
 

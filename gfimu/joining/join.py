@@ -58,6 +58,11 @@ class Joined:
         runs at its own rate from there. A diagnosis finds `clock_error` in it.
     by_reference_clock : Recording
         The same with the channels' times on the reference's clock, which rates in rad/s are of.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> gfimu.join("accelerometers.csv", "tacho.csv").recording  # doctest: +SKIP
     """
 
     recording: Recording

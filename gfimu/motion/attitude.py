@@ -72,6 +72,15 @@ def integrate_attitude(
     InputError
         If the shapes don't fit, time does not increase, ``q0`` has no direction, or the method is unknown or lacks
         ``alpha``.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import gfimu
+    >>> t = np.arange(101) / 100.0
+    >>> turning = np.tile([0.0, 0.0, np.pi], (101, 1))
+    >>> gfimu.integrate_attitude(t, turning)[-1].round(6)
+    array([0., 0., 0., 1.])
     """
     if method is None:
         method = "coning" if alpha is None else "fourth_order"

@@ -43,6 +43,13 @@ class EarthRotation:
     ------
     InputError
         If the latitude is outside its range, or north is not a number.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> earth = gfimu.EarthRotation(52.0)
+    >>> print(f"{1e5 * earth.horizontal_rate:.2f}e-5 rad/s")
+    4.49e-5 rad/s
     """
 
     latitude_deg: float

@@ -29,6 +29,12 @@ def equivalent_p_bias(position_error: ArrayLike, time: float) -> NDArray[np.floa
     ------
     InputError
         If ``time`` is not positive.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> print(f"{gfimu.equivalent_p_bias(4.5, 30.0):.3f} m/s²")
+    0.010 m/s²
     """
     _require_time(time)
     return 2.0 * np.asarray(position_error, dtype=float) / time**2  # GF-IMU paper, eq. 30 without drift
@@ -65,6 +71,12 @@ def equivalent_rate_drift(
     -----
     The GF-IMU paper's inversion of its eq. 30 on the position error measured after 30 s (about 30 °/h). The result
     is in the field's unit, degrees per hour, as its name for a figure of merit; everything else here is SI.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> print(f"{gfimu.equivalent_rate_drift(6.4, 30.0):.1f} °/h")
+    29.9 °/h
     """
     _require_time(time)
     from_drift = np.asarray(position_error, dtype=float) - 0.5 * np.asarray(p_bias, dtype=float) * time**2

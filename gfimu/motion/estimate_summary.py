@@ -162,6 +162,14 @@ def summarise(estimate: Estimate, recording: Recording, array: AccelerometerArra
         The recording it was found from.
     array : AccelerometerArray
         The array that was recorded.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> run = gfimu.simulate("paper_run", seed=1)
+    >>> summary = gfimu.summarise(gfimu.estimate(run, rest_bias=True), run, run.array)
+    >>> type(summary).__name__
+    'EstimateSummary'
     """
     known = np.isfinite(estimate.omega).all(axis=1) & np.isfinite(estimate.p).all(axis=1)
     last = int(np.flatnonzero(known)[-1]) if known.any() else -1
@@ -272,6 +280,13 @@ def centripetal_agreement(
     Agreement or None
         All combinations of the null space together, each weighted as the geometry weights it, m/s² against m/s²;
         None without a gyro, without a null space that sees ω, or with fewer than three samples.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> run = gfimu.simulate("paper_run", seed=1)
+    >>> gfimu.centripetal_agreement(run, run.array) is None
+    True
     """
     space = null_space(array)
     gyro = _gyro(recording)

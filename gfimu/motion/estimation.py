@@ -85,6 +85,15 @@ class Estimate(PlottedResult):
         Probability that ``omega`` and not ``−omega`` is the rate; one half at rest. Where the method judges it.
     metadata : mapping
         Array, method, form, format and software version.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> estimate = gfimu.estimate(gfimu.simulate("paper_run", seed=1), rest_bias=True)
+    >>> estimate.omega.shape
+    (3000, 3)
+    >>> estimate.to_pandas().columns[:3].tolist()
+    ['t_s', 'p_x_m_s2', 'p_y_m_s2']
     """
 
     t_s: NDArray[np.float64]

@@ -68,6 +68,12 @@ def level(p_at_rest: ArrayLike, *, heading: float = 0.0) -> NDArray[np.float64]:
     ------
     InputError
         If no row is complete, or the mean has no direction (free fall).
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> gfimu.level([0.0, 0.0, 9.81])
+    array([1., 0., 0., 0.])
     """
     rows = np.atleast_2d(np.asarray(p_at_rest, dtype=float))
     rows = rows[np.isfinite(rows).all(axis=1)]
@@ -120,6 +126,16 @@ def navigate(
     ------
     InputError
         If the shapes don't fit, time does not increase, or the method is unknown.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import gfimu
+    >>> t = np.arange(101) / 100.0
+    >>> upright = np.tile([1.0, 0.0, 0.0, 0.0], (101, 1))
+    >>> moved = gfimu.navigate(t, np.tile([1.0, 0.0, 9.80665], (101, 1)), upright)
+    >>> moved.position[-1].round(3)
+    array([0.5, 0. , 0. ])
     """
     times = np.asarray(t, dtype=float)
     force = np.asarray(p, dtype=float)

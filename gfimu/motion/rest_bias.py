@@ -282,6 +282,13 @@ def estimate_from_rest(
     ------
     InputError
         As `rest_bias` and `gfimu.motion.estimation.estimate`; also if a bias exceeds its data sheet's limit.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> run = gfimu.simulate("paper_run", seed=1)
+    >>> gfimu.estimate_from_rest(run, run.array)
+    Estimate(cube12, integrate, 3000 samples, 29.99 s at 100 Hz)
     """
     findings = refuse_or_warn(check_recording(recording, array), force=force)
     recording = without_dead_channels(recording, array, findings)

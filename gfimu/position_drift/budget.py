@@ -112,6 +112,14 @@ class DriftBudget(PlottedResult):
         Time at which, at rest, a bias acting through α has moved the unit as far as the one acting through p, s.
     note : str
         What the budget leaves out, empty if nothing.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> sources = gfimu.ErrorSources(noise_density=290e-6 * 9.80665)
+    >>> budget = gfimu.drift_budget(gfimu.AccelerometerArray.load("cube12"), 10.0, sources)
+    >>> [term.name for term in budget.terms]
+    ['noise of p', 'noise of alpha', 'gravity lost by tilt']
     """
 
     array: str
@@ -252,6 +260,14 @@ def drift_budget(
         If ``time`` is not positive or a value is not finite.
     GeometryError
         If the array can't see all six motions.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> sources = gfimu.ErrorSources(noise_density=290e-6 * 9.80665)
+    >>> budget = gfimu.drift_budget(gfimu.AccelerometerArray.load("cube12"), 10.0, sources)
+    >>> print(f"{budget.total_std[0]:.1f} m")
+    27.8 m
     """
     if not 0.0 < time <= _LONGEST:
         raise InputError(f"time is {time} s; it must be above zero, and {_LONGEST:g} s at most")

@@ -64,6 +64,12 @@ class ErrorSources:
         Random walk of the bias, m/s²/√s.
     rate_drift : float
         Standard deviation per axis of a constant error of the angular rate, rad/s.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> gfimu.ErrorSources(bias=0.01, noise_density=2.8e-3)
+    ErrorSources(bias=0.01, noise_density=0.0028, bias_random_walk=0.0, rate_drift=0.0)
     """
 
     bias: float = 0.0

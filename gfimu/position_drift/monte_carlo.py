@@ -45,6 +45,13 @@ class DriftSample:
         Mean and standard deviation over the runs of the position error in world axes, m.
     final : ndarray, shape (runs, 3)
         Position error of each run at the last time, m.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> found = gfimu.drift("cube12", time=5.0, noise_ug=290.0, monte_carlo=50)
+    >>> found.sample.runs, found.sample.final.shape
+    (50, (50, 3))
     """
 
     t_s: NDArray[np.float64]
@@ -103,6 +110,16 @@ def monte_carlo_drift(
     ------
     InputError
         If ``runs`` < 2 or ``time`` or ``sample_rate`` is not positive.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import gfimu
+    >>> sources = gfimu.ErrorSources(noise_density=290e-6 * 9.80665)
+    >>> cube = gfimu.AccelerometerArray.load("cube12")
+    >>> sample = gfimu.monte_carlo_drift(cube, 5.0, sources, runs=50, rng=np.random.default_rng(1))
+    >>> sample.final.shape
+    (50, 3)
     """
     if runs < 2:
         raise InputError(f"{runs} Monte Carlo runs have no standard deviation; ask for 2 or more")

@@ -72,6 +72,11 @@ class RestDrift(PlottedResult):
         Noise of the channels, from the longest rest.
     gravity : float
         Local gravity, m/s².
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> gfimu.drift_of_rest("rest.csv", array="cube12", time=10.0).rms_m  # doctest: +SKIP
     """
 
     array: str

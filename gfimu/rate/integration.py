@@ -73,6 +73,14 @@ def integrate_rate(
     Notes
     -----
     GF-IMU paper, step 10 (d). In body axes dω/dt = α holds component by component, so no attitude is needed.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import gfimu
+    >>> t = np.arange(101) / 100.0
+    >>> round(float(gfimu.integrate_rate(t, np.tile([0.0, 0.0, 1.0], (101, 1)))[-1, 2]), 6)
+    1.0
     """
     samples = np.asarray(alpha, dtype=float)
     if samples.ndim != 2 or samples.shape[1] != 3:

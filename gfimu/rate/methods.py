@@ -79,6 +79,14 @@ def estimate_rate(
         If the method is unknown, can't use a gyro or an unknown start, or the data don't fit.
     GeometryError
         If the array can't see what the method needs.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> run = gfimu.simulate("paper_run", seed=1)
+    >>> found = gfimu.estimate_rate(run.array, run.t_s, run.readings, gfimu.SensorErrors.from_parts(run.array, 100.0))
+    >>> found.omega.shape
+    (3000, 3)
     """
     chosen = rate_method(method)
     start = settings or FilterSettings()

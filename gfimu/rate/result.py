@@ -120,6 +120,16 @@ class RateEstimate(PlottedResult):
     sign_probability : ndarray, shape (n,), or None
         Probability that ``omega`` and not ``−omega`` is the rate; one half at rest, where the sign means nothing. None
         where the sign was never in doubt.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> run = gfimu.simulate("paper_run", seed=1)
+    >>> cube = run.array
+    >>> errors = gfimu.SensorErrors.from_parts(cube, 100.0)
+    >>> found = gfimu.estimate_rate(cube, run.t_s, run.readings, errors, method="filter")
+    >>> found.omega.shape
+    (3000, 3)
     """
 
     method: str

@@ -60,6 +60,13 @@ class SensorErrors:
         White noise of a gyro axis per sample, rad/s.
     gyro_bias_std : float
         Uncertainty of the constant bias of a gyro axis before the run, rad/s.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> errors = gfimu.SensorErrors.from_parts(gfimu.AccelerometerArray.load("cube12"), 100.0)
+    >>> errors.noise_std.round(4)[:3]
+    array([0.0307, 0.0307, 0.0435])
     """
 
     noise_std: NDArray[np.float64]

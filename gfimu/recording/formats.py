@@ -71,6 +71,11 @@ def open_recording(
     ------
     InputError
         As `gfimu.Recording.read`, and the reader of the format.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> gfimu.open_recording("run.parquet")  # doctest: +SKIP
     """
     if isinstance(path, MappedFile):
         return path.read(array)

@@ -41,6 +41,12 @@ class MappedFile(os.PathLike[str]):
         What its columns are.
     others : tuple of Path
         Files of further chips on the same clock, in the order of the array's chips.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import gfimu
+    >>> gfimu.MappedFile(Path("log.csv"), column_map).read()  # doctest: +SKIP
     """
 
     path: Path

@@ -86,6 +86,11 @@ def read_mimu4444(path: str | Path) -> Recording:
     ------
     InputError
         If the file can't be read or holds no valid packet.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> gfimu.read_mimu4444("stream.bin")  # doctest: +SKIP
     """
     file = Path(path)
     packets = _decode(_read_bytes(file))

@@ -59,6 +59,15 @@ class Recording(PlottedResult):
         Columns that the format does not know, kept as they came.
     unit : {"m_s2", "lsb"}
         Unit of ``readings``.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> run = gfimu.simulate("rest", seed=1)
+    >>> run.channels[:3], run.reference.keys() >= {"tacho_rad_s"}
+    (('a11', 'a12', 'a13'), True)
+    >>> gfimu.Recording.read(run.to_pandas()).channels == run.channels
+    True
     """
 
     t_s: NDArray[np.float64]

@@ -3,8 +3,18 @@
 A result describes itself once, as columns, facts and panels; tables, pages and pictures of all results are made here.
 """
 
+from gfimu.results.figure import drawn_chips
 from gfimu.results.html import result_html
 from gfimu.results.panels import Panel, Series, axis_series, text_column
 from gfimu.results.result import PlottedResult, TableResult
 
-__all__ = ["Panel", "PlottedResult", "Series", "TableResult", "axis_series", "result_html", "text_column"]
+__all__ = [
+    "Panel",
+    "PlottedResult",
+    "Series",
+    "TableResult",
+    "axis_series",
+    "drawn_chips",
+    "result_html",
+    "text_column",
+]

@@ -6,13 +6,14 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gfimu.results.panels import Panel, Series
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
 
-__all__ = ["drawn"]
+__all__ = ["drawn", "drawn_chips"]
 
 _WIDTH, _HEIGHT = 7.0, 2.7  # inches of one panel
 _LONGEST_LEGEND = 12
@@ -31,6 +32,33 @@ def drawn(panels: Sequence[Panel], figure: Figure | SubFigure | None = None) -> 
         _draw(axes, panel)
     for axes in grid.flat[len(panels) :]:
         axes.remove()
+    return drawing
+
+
+def drawn_chips(
+    title: str,
+    chips: Sequence[tuple[str, NDArray[np.float64], NDArray[np.float64]]],
+    figure: Figure | None = None,
+) -> Figure:
+    """Draw chips in 3-D: the name of each, its position (3,), m, and its sensing axes (k, 3)."""
+    from gfimu.visual.colours import PALE, chip_colour, css
+
+    drawing = _new_figure(1, 2) if figure is None else figure
+    axes: Any = drawing.add_subplot(projection="3d")
+    places = 1e3 * np.array([place for _, place, _ in chips])  # (k, 3), mm
+    reach = max(float(np.abs(places).max()), 1.0)
+    for number, ((name, _, directions), place) in enumerate(zip(chips, places, strict=True)):
+        colour = css(chip_colour(number, on_paper=True))
+        axes.plot(*np.column_stack([[*place[:2], -1.4 * reach], place]), color=css(PALE), linewidth=0.8)
+        axes.scatter(*place, s=36, color=colour)
+        for direction in directions:
+            axes.quiver(*place, *(0.35 * reach * direction), color=colour, linewidth=1.4, arrow_length_ratio=0.25)
+        axes.text(*(place + 0.08 * reach), name, fontsize=9)
+    axes.set_title(f"{title}, body frame", fontsize=10)
+    for axis in "xyz":
+        getattr(axes, f"set_{axis}lim")(-1.4 * reach, 1.4 * reach)
+        getattr(axes, f"set_{axis}label")(f"{axis}, mm")
+    axes.set_box_aspect((1.0, 1.0, 1.0))
     return drawing
 
 

@@ -39,7 +39,7 @@ def result_html(
     notes : sequence of str
         Sentences below.
     """
-    parts = [f'<div class="gfimu-result"><strong>{escape(heading)}</strong>']
+    parts = [f'<div class="gfimu-result" style="overflow-x:auto"><strong>{escape(heading)}</strong>']
     if facts:
         rows = "".join(f"<tr>{_cell(word, scope='row')}{_cell(value)}</tr>" for word, value in facts)
         parts.append(f'<table style="{_TABLE}"><tbody>{rows}</tbody></table>')
@@ -50,6 +50,7 @@ def result_html(
 
 
 def _table(columns: Mapping[str, NDArray[Any]]) -> str:
+    columns = {name: values for name, values in columns.items() if not _is_blank(values)}
     sides = {name: "right" if values.dtype.kind in "fiu" else "left" for name, values in columns.items()}
     head = "".join(_cell(name, scope="col", side=sides[name]) for name in columns)
     texts = {name: [_text(value) for value in values[:MOST_ROWS].tolist()] for name, values in columns.items()}
@@ -66,6 +67,11 @@ def _table(columns: Mapping[str, NDArray[Any]]) -> str:
         f'<table style="{_TABLE}"><thead style="border-bottom:{_RULE}"><tr>{head}</tr></thead>'
         f"<tbody>{body}</tbody></table>"
     )
+
+
+def _is_blank(values: NDArray[Any]) -> bool:
+    """Whether a column holds empty texts only."""
+    return bool(len(values)) and values.dtype.kind in "OU" and not any(values.tolist())
 
 
 def _cell(text: str, *, scope: str = "", side: str = "left") -> str:

@@ -44,6 +44,14 @@ class AllanDeviation:
         Sample rate, Hz.
     overlapping : bool
         Whether every starting sample was used.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import gfimu
+    >>> found = gfimu.allan_deviation(np.random.default_rng(1).normal(size=4096), rate=100.0)
+    >>> print(f"{found.deviation[0]:.2f} at {found.tau[0]:.2f} s")
+    1.00 at 0.01 s
     """
 
     factor: NDArray[np.int64]
@@ -103,6 +111,14 @@ def allan_deviation(
     ------
     InputError
         If the series is too short, has missing values, or a factor does not fit into it.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import gfimu
+    >>> found = gfimu.allan_deviation(np.random.default_rng(1).normal(size=4096), rate=100.0)
+    >>> print(f"{found.deviation[0]:.2f}")
+    1.00
     """
     series = np.asarray(values, dtype=float)
     if series.ndim != 1 or len(series) < 3:

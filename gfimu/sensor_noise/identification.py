@@ -87,6 +87,16 @@ class NoiseModel:
         The curve they were fitted to.
     misfit : float
         Weighted square of the residuals over their number of degrees of freedom: near 1 where the model holds.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import gfimu
+    >>> model = gfimu.identify_noise(np.random.default_rng(1).normal(size=20000), rate=100.0)
+    >>> model.found
+    ('N',)
+    >>> print(f"N = {model['N'].value:.3f} ± {model['N'].std:.3f} per √Hz")
+    N = 0.099 ± 0.000 per √Hz
     """
 
     terms: dict[str, NoiseTerm]
@@ -159,6 +169,14 @@ def identify_noise(values: ArrayLike, rate: float, *, candidates: Sequence[str] 
     ------
     InputError
         If the series is too short, does not vary, or varies so smoothly that it is no noise.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import gfimu
+    >>> model = gfimu.identify_noise(np.random.default_rng(1).normal(size=20000), rate=100.0)
+    >>> model.found
+    ('N',)
     """
     try:
         return _identified(values, rate, candidates)

@@ -47,6 +47,13 @@ class RecordingNoise(PlottedResult):
         Stretch used, s.
     about_axis : AxisNoise, optional
         What it means for a rotation about a known axis (`gfimu.known_axis.accuracy.noise`), where that was asked for.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> found = gfimu.noise(gfimu.simulate("rest", seed=1))
+    >>> print(f"{1e3 * found.models['a11']['N'].value:.2f}e-3 m/s²/√Hz")
+    2.85e-3 m/s²/√Hz
     """
 
     models: Mapping[str, NoiseModel]
@@ -192,6 +199,12 @@ def recording_noise(
     ------
     InputError
         If there is no rest, or a channel has missing samples or does not vary.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> gfimu.recording_noise(gfimu.simulate("rest", seed=1)).unit
+    'm_s2'
     """
     if stretch not in STRETCHES:
         raise unknown_name("stretch", stretch, STRETCHES)

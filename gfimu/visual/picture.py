@@ -112,21 +112,25 @@ def _picture_of_estimate(file: Path, found: Estimate, out: Path, array: Accelero
 
 def _estimate(run: Recording, array: AccelerometerArray, *, force: bool) -> tuple[Estimate | None, str]:
     """Estimate as far as possible; a note says how, for the picture."""
-    on_table = any(name in run.reference for name in ("tacho_rad_s", "command_rad_s", "angle_rad"))
     try:
-        if on_table:
-            return estimate_from_rest(
-                run, array, force=force
-            ), "Biases were read off the first rest, with the table taken as level."
-        return estimate(run, array, force=force), ""
+        return _six_motions(run, array, force=force)
     except GeometryError as error:
         return (
             _about_axis(run, array, array.turning_axis) if array.turning_axis is not None else (None, _missing(error))
         )
+
+
+def _six_motions(run: Recording, array: AccelerometerArray, *, force: bool) -> tuple[Estimate, str]:
+    """Estimate all six motions, on a table with the biases of the first rest where there is one."""
+    if not any(name in run.reference for name in ("tacho_rad_s", "command_rad_s", "angle_rad")):
+        return estimate(run, array, force=force), ""
+    try:
+        found = estimate_from_rest(run, array, force=force)
+    except GeometryError:
+        raise
     except InputError as error:  # nothing to read biases off: their effect stays in the picture
-        if not on_table:
-            raise
         return estimate(run, array, force=force), f"Biases are left in: {error}."
+    return found, "Biases were read off the first rest, with the table taken as level."
 
 
 def _about_axis(run: Recording, array: AccelerometerArray, axis: TurningAxis) -> tuple[Estimate | None, str]:

@@ -20,6 +20,9 @@ LONGEST_LEGEND = 12
 """Lines that a legend names; a longer one would cover the plot."""
 
 
+_LONGEST_TOGETHER_S = 60.0  # of a run whose plots zoom together
+
+
 @dataclass(frozen=True)
 class Line:
     """One line, or several of one name and colour: the edges of a band, the components of a truth.
@@ -86,24 +89,45 @@ class Plot:
             )
 
     def view(self) -> rrb.TimeSeriesView:
-        """Return the view of the plot for a blueprint."""
+        """Return the view of the plot for a blueprint.
+
+        Plots of a run of up to a minute zoom together. Plots that do show the half minute around the cursor of a longer
+        run, whatever range is asked for: each of those zooms alone, and shows the whole run at first.
+        """
+        first, last = _whole_run(self.lines)
+        together = last - first <= _LONGEST_TOGETHER_S
+        whole = rr.TimeRange(
+            start=rr.TimeRangeBoundary.absolute(seconds=first), end=rr.TimeRangeBoundary.absolute(seconds=last)
+        )
         return rrb.TimeSeriesView(
             origin=f"/{self.entity}",
             name=self.title,
-            axis_x=rrb.TimeAxis(link=rrb.components.LinkAxis.LinkToGlobal, view_range=_whole_run(self.lines)),
-            axis_y=None if self.span is None else rrb.ScalarAxis(range=self.span),
+            axis_x=rrb.TimeAxis(
+                link=rrb.components.LinkAxis.LinkToGlobal if together else rrb.components.LinkAxis.Independent,
+                view_range=whole,
+            ),
+            axis_y=rrb.ScalarAxis(range=self.span or _all_values(self.lines)),
             plot_legend=rrb.PlotLegend(
                 corner=_emptiest_corner(self.lines), visible=self.legend and len(self.lines) <= LONGEST_LEGEND
             ),
         )
 
 
-def _whole_run(lines: Sequence[Line]) -> rr.TimeRange:
-    """Range of all times of the lines; the viewer would open on the surroundings of its cursor."""
+def _whole_run(lines: Sequence[Line]) -> tuple[float, float]:
+    """First and last time of the lines, s."""
     times = [float(line.t[end]) for line in lines if len(line.t) for end in (0, -1)] or [0.0]
-    return rr.TimeRange(
-        start=rr.TimeRangeBoundary.absolute(seconds=min(times)), end=rr.TimeRangeBoundary.absolute(seconds=max(times))
-    )
+    return min(times), max(times)
+
+
+def _all_values(lines: Sequence[Line]) -> tuple[float, float]:
+    """Range of all values with a margin; the viewer's own is that of the samples that have arrived when it opens."""
+    values = np.concatenate([line.values.ravel() for line in lines])
+    values = values[np.isfinite(values)]
+    if not len(values):
+        return -1.0, 1.0
+    low, high = float(values.min()), float(values.max())
+    margin = 0.05 * (high - low) or 0.1 * abs(high) or 1.0
+    return low - margin, high + margin
 
 
 def _emptiest_corner(lines: Sequence[Line]) -> rrb.Corner2D:

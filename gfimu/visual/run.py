@@ -45,9 +45,11 @@ from gfimu.visual.rrd_file import notes_view, write_rrd
 from gfimu.visual.run_plots import (
     angle_plot,
     banded_rate_plots,
+    carriage_plots,
     drift_plot,
     free_rate_plots,
     health_plot,
+    known_motion_plots,
     motion_plots,
     position_plot,
     raw_plots,
@@ -112,10 +114,14 @@ def write_run(
     scene = run_scene(arrows, array, estimate=estimate, known=known, shapes=shapes, on_table=spins)
     raw = raw_plots(recording.t_s, readings, array)
     about = spin_axis(recording, array)
+    carried = carriage_plots(recording)  # of a body that does not turn: its rate would be a line at zero
     rates = spin_rate_plots(recording, estimate, known, about) if spins else free_rate_plots(recording, estimate, known)
+    rates = carried or rates
     cells: list[Sequence[Plot | PositionTrace]] = [[plot] for plot in rates]
     if estimate is not None:
         cells += _motion_cells(estimate, known, array)
+    else:
+        cells += [[plot] for plot in known_motion_plots(known)]
     angle = angle_plot(estimate, known, about) if spins or known is not None else None
     cells += [[plot] for plot in (angle, drift_plot(drift) if drift is not None else None) if plot is not None]
     write_rrd(
@@ -230,8 +236,11 @@ def run_scene(
         bodies.append(Body("estimate", ghost_shapes(array), _ghost_path(array, estimate, known)))
     if table and is_cube(array):
         return Scene(bodies)
-    size = drawing_size(array)
-    return Scene(bodies, eye=start + 2.6 * size * np.array([1.1, -1.0, 0.8]), look_at=start, grid_spacing=size)
+    size, centre = drawing_size(array), start
+    if axis is not None and axis.hub == "fixed":  # body and pivot are both in the picture
+        pivot = to_rotation(np.nan_to_num(solid.quaternion[:1])).apply(axis.point)[0] if len(solid.t) else axis.point
+        size, centre = max(size, 0.8 * float(np.linalg.norm(pivot))), start + 0.5 * pivot
+    return Scene(bodies, eye=centre + 3.2 * size * np.array([1.1, -1.0, 0.8]), look_at=centre, grid_spacing=size)
 
 
 def reading_arrows(array: AccelerometerArray, t: NDArray[np.float64], readings: NDArray[np.float64]) -> SensingArrows:

@@ -19,9 +19,11 @@ from gfimu.visual.plots import LONGEST_LEGEND, Line, Plot
 __all__ = [
     "angle_plot",
     "banded_rate_plots",
+    "carriage_plots",
     "drift_plot",
     "free_rate_plots",
     "health_plot",
+    "known_motion_plots",
     "motion_plots",
     "position_plot",
     "raw_plots",
@@ -68,6 +70,22 @@ def raw_plots(t: NDArray[np.float64], readings: NDArray[np.float64], array: Acce
     return groups
 
 
+_CARRIAGE = {
+    "carriage_m": "place of the carriage, m",
+    "carriage_speed_m_s": "speed of the carriage, m/s",
+    "carriage_acceleration_m_s2": "acceleration of the carriage, m/s²",
+}
+
+
+def carriage_plots(recording: Recording) -> list[Plot]:
+    """Plot place, speed and acceleration of a carriage, those that the recording has as references."""
+    return [
+        Plot(title, [Line("commanded", recording.t_s, recording.reference[name], COMMAND)], legend=False)
+        for name, title in _CARRIAGE.items()
+        if name in recording.reference and np.isfinite(recording.reference[name]).any()
+    ]
+
+
 def spin_rate_plots(
     recording: Recording, estimate: MotionEstimate | None, known: KnownMotion | None, axis: NDArray[np.float64]
 ) -> list[Plot]:
@@ -107,12 +125,24 @@ def spin_rate_plots(
 
 
 def free_rate_plots(recording: Recording, estimate: MotionEstimate | None, known: KnownMotion | None) -> list[Plot]:
-    """Three components of the rate beside truth or gyro; then their errors with the band of the widest."""
+    """Three components of the rate beside truth or gyro; then their errors with the band of the widest.
+
+    Truth or gyro are grey behind an estimate; alone they have the hues of the axes.
+    """
     lines, errors = [], []
     for axis, (name, colour) in enumerate(zip(_NAMES, AXES, strict=True)):
         reference = _rate_reference(recording, known, axis)
         if reference is not None:
-            lines.append(Line(f"{reference[0]} {name}", reference[1], reference[2], TRUTH, 2.5))
+            grey = estimate is not None
+            lines.append(
+                Line(
+                    f"{reference[0]} {name}",
+                    reference[1],
+                    reference[2],
+                    TRUTH if grey else colour,
+                    2.5 if grey else 1.5,
+                )
+            )
         if estimate is None:
             continue
         lines.append(Line(f"estimate {name}", estimate.t_s, estimate.omega[:, axis], colour))
@@ -165,6 +195,20 @@ def motion_plots(estimate: MotionEstimate, known: KnownMotion | None) -> Iterato
         if known is not None and truth is not None:
             lines.insert(0, Line(known.name, known.t, truth[:, axes], TRUTH, 2.5))
         yield Plot(title, lines)
+
+
+def known_motion_plots(known: KnownMotion | None) -> list[Plot]:
+    """Plot angular acceleration and specific force of a motion that is known, where no estimate stands beside them."""
+    parts = [] if known is None else [("α, rad/s²", "α", known.alpha), ("p, m/s²", "p", known.p)]
+    names = {"α": "angular acceleration", "p": "specific force"}
+    return [
+        Plot(
+            f"{names[symbol]} {title}",
+            [Line(f"{symbol} {name}", known.t, values[:, axis], AXES[axis]) for axis, name in enumerate(_NAMES)],
+        )
+        for title, symbol, values in parts
+        if known is not None and values is not None and np.isfinite(values).any()
+    ]
 
 
 def angle_plot(estimate: MotionEstimate | None, known: KnownMotion | None, axis: NDArray[np.float64]) -> Plot | None:

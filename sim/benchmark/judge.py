@@ -39,7 +39,7 @@ POINTS = {
     "measured": math.nan,
     "contradicted": math.nan,
 }
-"""Points by outcome; of a set of k names at most 1/k, and of ``unknown`` twice as many where no name would be right.
+"""Points by outcome; of a set of k names at most 1/k; of ``unknown`` twice as many in the set ``unlisted``.
 
 Somebody who is given a wrong name repairs the wrong part and still has a wrong simulation; ``unknown`` costs a further
 look. With these points a single name pays from a probability of 5/8 on: p − (1 − p) > 1/4.
@@ -48,6 +48,7 @@ look. With these points a single name pays from a probability of 5/8 on: p − (
 LEAST_MOVED = 15.0
 """d′ that what is hidden must have in the fresh motion for its removal to be measured."""
 
+_WHERE_NO_NAME_IS_RIGHT = 2.0  # times the points of ``unknown``
 _NOT_A_NAME = "unknown"
 _TURN = 2 * math.pi
 
@@ -166,12 +167,7 @@ def _judged_measured(answer: Answer, data: str | Path) -> Judged:
 
 def _judged(answer: Answer, fixed: Fixed) -> Judged:
     truth, claims = fixed.truth, claims_of(answer)
-    outcome, share = outcome_of(truth, answer, claims, unlisted=fixed.case.set_name == "unlisted")
-    points = POINTS[outcome]
-    if outcome == "set":
-        points = min(points, share)
-    if outcome == "unknown" and fixed.case.set_name == "unlisted" and truth.place != "nothing":
-        points *= 2.0
+    outcome, points = outcome_of(answer, fixed)
     removed, ratio = _prediction(answer, claims, fixed)
     return Judged(
         answer.world,
@@ -207,21 +203,26 @@ def claims_of(answer: Answer) -> list[Claim]:
     return claims
 
 
-def outcome_of(truth: Truth, answer: Answer, claims: Sequence[Claim], *, unlisted: bool) -> tuple[str, float]:
-    """Return the outcome of an answer and, of a set, one over its largest number of names."""
+def outcome_of(answer: Answer, fixed: Fixed) -> tuple[str, float]:
+    """Return the outcome of an answer for a drawn world and its points, by its names alone."""
+    truth, unlisted = fixed.truth, fixed.case.set_name == "unlisted"
+    claims = [claim for claim in claims_of(answer) if not claim.names <= set(truth.allowed)]
+    nothing = not truth.hidden or truth.place == "nothing"
     if answer.verdict == "error":
-        return "error", 0.0
-    claims = [claim for claim in claims if not claim.names <= set(truth.allowed)]
-    largest = 1.0 / max((len(claim.names) for claim in claims), default=1)
-    if not truth.hidden or truth.place == "nothing":
-        if claims:
-            return "false_alarm", 0.0
-        return ("unknown" if answer.verdict == "unknown" else "quiet"), 0.0
-    if not claims:
-        return ("unknown" if answer.verdict == "unknown" else "missed"), 0.0
-    if unlisted:
-        return _outcome_of_unlisted(truth, claims), largest
-    return _outcome_of_listed(truth, claims), largest
+        outcome = "error"
+    elif not claims:
+        silent = "quiet" if nothing else "missed"
+        outcome = "unknown" if answer.verdict == "unknown" else silent
+    elif nothing:
+        outcome = "false_alarm"
+    else:
+        outcome = _outcome_of_unlisted(truth, claims) if unlisted else _outcome_of_listed(truth, claims)
+    points = POINTS[outcome]
+    if outcome == "set":
+        points = min(points, 1.0 / max(len(claim.names) for claim in claims))
+    if outcome == "unknown" and unlisted and not nothing:
+        points *= _WHERE_NO_NAME_IS_RIGHT
+    return outcome, points
 
 
 def _outcome_of_listed(truth: Truth, claims: Sequence[Claim]) -> str:
@@ -289,14 +290,16 @@ def _prediction(answer: Answer, claims: Sequence[Claim], fixed: Fixed) -> tuple[
     if fresh is None or answer.verdict == "error":
         return math.nan, math.nan
     twin, effects = nominal_twin(fixed.case), _effects(claims)
-    with np.errstate(all="ignore"):  # an absurd size may overflow; the answer then removes nothing
-        before, after = fresh.distance(twin), fresh.distance(twin, effects)
-        rms = fresh.rms_error(twin, effects)
-    removed = 1.0 - (after / before) ** 2 if before >= LEAST_MOVED else math.nan
-    if not math.isfinite(after):
-        removed = -math.inf
+    before, after, rms = fresh.distance(twin), math.inf, math.inf
+    try:
+        with np.errstate(all="ignore"):
+            after, rms = fresh.distance(twin, effects), fresh.rms_error(twin, effects)
+    except (ArithmeticError, ValueError):  # no simulation runs with absurd sizes: the answer removes nothing
+        pass
     ratio = math.nan if answer.expected_rms_m_s2 is None else answer.expected_rms_m_s2 / rms
-    return max(removed, -1.0) if not math.isnan(removed) else math.nan, ratio
+    if before < LEAST_MOVED:
+        return math.nan, ratio
+    return (max(1.0 - (after / before) ** 2, -1.0) if math.isfinite(after) else -1.0), ratio
 
 
 def _effects(claims: Sequence[Claim]) -> list[Effect]:

@@ -1,7 +1,8 @@
 """The library of effects as a linear model of one recording: columns, least squares, answers from them.
 
-What a method of any kind may begin with. The smoothed tachometer is taken for the motion of the table and the noise for
-white, as is usual; each column is the finite difference of the twin's prediction by one size of an effect.
+What a method of any kind may begin with. Each column is the finite difference of the twin's prediction by one size of
+an effect; the noise is taken for white. The motion of the table is either free, a spline that is fitted with everything
+else, or taken from the smoothed tachometer.
 """
 
 from __future__ import annotations
@@ -13,19 +14,24 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import BSpline
+from scipy.linalg import cho_factor, cho_solve
 from scipy.ndimage import gaussian_filter1d
+from scipy.sparse import csr_array
+from scipy.stats import norm
 
 from gfimu.recording import Recording
 from sim.effects import Effect
-from sim.motion import SplineSpin
+from sim.motion import SpinMotion, SplineSpin
 from sim.twin import Twin
 
-__all__ = ["Block", "Candidate", "KnownDrive", "LinearLibrary", "fitted_sizes"]
+__all__ = ["Block", "Candidate", "FreeDrive", "KnownDrive", "LinearLibrary", "fitted_sizes", "motion_columns"]
 
 Floats = NDArray[np.float64]
 
 _SMOOTHING = 0.03  # of the tachometer, s
 _STEP = 0.1  # finite difference as a share of the prior's standard deviation
+_KNOTS_S = 0.03  # distance of the knots of a free motion
 _NEAR = 0.02  # the same about effects that are large already
 _SINGULAR = 1e-10  # numerical: singular values below this share count as zero
 _SEEN = 1e-6  # standard deviation as a share of the prior below which a size was left out, not measured
@@ -60,6 +66,73 @@ class KnownDrive:
             return moved
         corrected = SplineSpin.through(self._t, self._rate - (reading - self._reference))
         return self._predict(corrected, ())[0]
+
+
+def motion_columns(motion: SpinMotion, t: Floats, nominal: Floats, tacho_noise: float, knots_s: float) -> csr_array:
+    """Return what the coefficients of a cubic spline of the table's rate change, shape (n (c + 1), knots).
+
+    Parameters
+    ----------
+    motion : SpinMotion
+        Motion about which the change is linear.
+    t : ndarray, shape (n,)
+        Sample times, s.
+    nominal : ndarray, shape (n, c)
+        Prediction of the channels in this motion, in units of their noise.
+    tacho_noise : float
+        White noise of the tachometer, rad/s, whose reading stands behind the channels of each sample.
+    knots_s : float
+        Distance of the knots, s.
+    """
+    state = motion.at(t)
+    known = np.column_stack([np.ones_like(t), state.acceleration, state.rate**2])
+    _, tangential, centripetal = np.linalg.lstsq(known, nominal, rcond=None)[0]  # a level table reads nothing else
+    knots = np.arange(t[0] - 3 * knots_s, t[-1] + 4 * knots_s, knots_s)
+    count = len(knots) - 4
+    rate = BSpline(knots, np.eye(count), 3, extrapolate=False)
+    b, slope = np.nan_to_num(rate(t)), np.nan_to_num(rate.derivative()(t))  # (n, knots)
+    moved = slope[:, None] * tangential[:, None] + 2.0 * (state.rate[:, None] * b)[:, None] * centripetal[:, None]
+    return csr_array(np.concatenate([moved, b[:, None] / tacho_noise], axis=1).reshape(-1, count))
+
+
+class FreeDrive:
+    """Channels and tachometer of a recording in units of their noise, with the motion of the table projected out.
+
+    Parameters
+    ----------
+    recording : Recording
+        With a tachometer.
+    twin : Twin
+        The simulation.
+    """
+
+    def __init__(self, recording: Recording, twin: Twin) -> None:
+        self._twin, self._t = twin, recording.t_s
+        tacho = recording.reference["tacho_rad_s"]
+        rate = gaussian_filter1d(tacho, _SMOOTHING / recording.sample_period)
+        self._temperature = recording.reference.get("temperature_degC")
+        self._motion = SplineSpin.through(self._t, rate)
+        self._tacho_noise = float(np.median(np.abs(tacho - rate))) / norm.ppf(0.75)
+        self._white = twin.expected_noise(recording.sample_rate).white
+        nominal = self.predicted().reshape(len(tacho), -1)[:, :-1]
+        self._moves = motion_columns(self._motion, self._t, nominal, self._tacho_noise, _KNOTS_S)
+        self._motion_gram = cho_factor((self._moves.T @ self._moves).toarray())
+        self.measured = self._joined(recording.for_array(twin.array), tacho)
+
+    def predicted(self, *effects: Effect) -> Floats:
+        """Return the prediction with effects, (n (c + 1),)."""
+        channels, reference = self._twin.predict(self._motion, self._t, effects=effects, temperature=self._temperature)
+        return self._joined(channels, reference)
+
+    def _joined(self, channels: Floats, reference: Floats) -> Floats:
+        return np.column_stack([channels / self._white, reference / self._tacho_noise]).ravel()
+
+    def products(self, columns: Floats, residual: Floats) -> tuple[Floats, Floats, float]:
+        """Return normal matrix, score and sum of squares, (m, m), (m,) and a number, the motion at its best."""
+        along, moved = self._moves.T @ columns, self._moves.T @ residual
+        gram = columns.T @ columns - along.T @ cho_solve(self._motion_gram, along)
+        best = cho_solve(self._motion_gram, moved)
+        return gram, columns.T @ residual - along.T @ best, float(residual @ residual - moved @ best)
 
 
 @dataclass(frozen=True)
@@ -139,10 +212,12 @@ class LinearLibrary:
     chi2: float
 
     @classmethod
-    def of(cls, recording: Recording, twin: Twin) -> LinearLibrary:
-        """Compute the columns of a recording."""
+    def of(cls, recording: Recording, twin: Twin, *, free_motion: bool = False) -> LinearLibrary:
+        """Compute the columns of a recording, the motion of the table free or that of the smoothed tachometer."""
         white = twin.expected_noise(recording.sample_rate).white
         drive = KnownDrive(recording, twin)
+        free = FreeDrive(recording, twin) if free_motion else None
+        begun = free.predicted() if free else (drive.nominal / white).ravel()
         residual = np.nan_to_num(recording.for_array(twin.array) - drive.nominal)
         blocks: list[Block] = []
         columns: list[Floats] = []
@@ -154,15 +229,20 @@ class LinearLibrary:
                 for number, size in enumerate(sizes):
                     values = np.zeros(len(sizes))
                     values[number] = _STEP * size.prior_std
-                    moved = drive.readings(family.from_sizes(twin.array, values, shape))
-                    columns.append(((moved - drive.nominal) / white).ravel() / _STEP)
+                    effect = family.from_sizes(twin.array, values, shape)
+                    moved = free.predicted(effect) if free else (drive.readings(effect) / white).ravel()
+                    columns.append((moved - begun) / _STEP)
                     scale.append(size.prior_std)
                 places = tuple(pattern.mixing for pattern in family.patterns(twin.array))
                 keys = tuple(size.key for size in sizes)
                 blocks.append(Block(family, shape, slice(first, len(columns)), keys, places))
         design, whitened = np.column_stack(columns), (residual / white).ravel()
-        gram, score = design.T @ design, design.T @ whitened
-        return cls(tuple(blocks), gram, score, np.array(scale), residual.size, float(whitened @ whitened))
+        if free:
+            products = free.products(design, np.nan_to_num(free.measured - begun))
+        else:
+            products = design.T @ design, design.T @ whitened, float(whitened @ whitened)
+        gram, score, chi2 = products
+        return cls(tuple(blocks), gram, score, np.array(scale), residual.size, chi2)
 
     @cached_property
     def candidates(self) -> tuple[Candidate, ...]:
@@ -217,20 +297,19 @@ def fitted_sizes(recording: Recording, twin: Twin, effects: Sequence[Effect]) ->
     effects : sequence of Effect
         What the recording is known to have, near its true sizes and shapes.
     """
-    array, drive = twin.array, KnownDrive(recording, twin)
-    white = twin.expected_noise(recording.sample_rate).white
+    array, drive = twin.array, FreeDrive(recording, twin)
     sizes = [(number, place, size) for number, one in enumerate(effects) for place, size in enumerate(one.sizes(array))]
-    begun, columns = drive.readings(*effects), []
+    begun, columns = drive.predicted(*effects), []
     for number, place, size in sizes:
         values = effects[number].size_values(array)
         values[place] += _NEAR * size.prior_std
         moved = list(effects)
         moved[number] = type(effects[number]).from_sizes(array, values, effects[number].shape_values())
-        columns.append(((drive.readings(*moved) - begun) / white).ravel() / _NEAR)
-    rest = np.nan_to_num((recording.for_array(array) - begun) / white).ravel()
-    design = np.column_stack(columns) if columns else np.zeros((rest.size, 0))
-    covariance = np.linalg.pinv(design.T @ design, rcond=_SINGULAR)
-    step, std = covariance @ (design.T @ rest), np.sqrt(np.diag(covariance))
+        columns.append((drive.predicted(*moved) - begun) / _NEAR)
+    design = np.column_stack(columns) if columns else np.zeros((begun.size, 0))
+    gram, score, _ = drive.products(design, np.nan_to_num(drive.measured - begun))
+    covariance = np.linalg.pinv(gram, rcond=_SINGULAR, hermitian=True)
+    step, std = covariance @ score, np.sqrt(np.maximum(np.diag(covariance), 0.0))
     causes: list[dict[str, Any]] = [
         {"effect": one.name, "parameters": {key: {"value": value} for key, value in one.parameters.items()}}
         for one in effects

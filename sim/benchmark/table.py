@@ -134,7 +134,7 @@ class Summary:
             self.set_name,
             self.method,
             str(len(self.judged)),
-            "–" if np.isnan(mean) else f"{mean:+.2f} ± {half:.2f}",
+            "–" if np.isnan(mean) else f"{mean:+.2f}" + ("" if np.isnan(half) else f" ± {half:.2f}"),
             str(self.share("alone")),
             str(self.share("set", "part")),
             str(self.share("wrong")),
@@ -152,11 +152,13 @@ def _is_nothing(one: Judged) -> bool:
 
 
 def summaries(judged: Iterable[Judged], *, together: bool = True) -> list[Summary]:
-    """Return a summary per set and method, sets in the order of the release; ``together`` adds one of all sets."""
+    """Return a summary per set and method, in the order of the release; ``together`` adds one of all that are drawn."""
     groups: dict[tuple[str, str], list[Judged]] = defaultdict(list)
-    for one in judged:
+    listed = list(judged)
+    several = together and len({one.set_name for one in listed} - {"real"}) > 1
+    for one in listed:
         groups[one.set_name, one.method].append(one)
-        if together and one.outcome not in MEASURED_OUTCOMES:
+        if several and one.set_name != "real":
             groups["all", one.method].append(one)
     order = [*SETS, "all"]
     methods = list(dict.fromkeys(method for _, method in groups))

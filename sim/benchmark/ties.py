@@ -10,11 +10,10 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import BSpline
 from scipy.linalg import cho_factor, cho_solve
-from scipy.sparse import csr_array
 
 from sim.benchmark.drawing import FORMLESS
+from sim.benchmark.library import motion_columns
 from sim.benchmark.world import World
 from sim.effects import Effect, make_effect
 from sim.motion import SpinMotion
@@ -41,7 +40,8 @@ class _Observer:
         self._tacho_noise = tacho_noise
         self._white = twin.expected_noise(1.0 / float(np.median(np.diff(t)))).white
         self._nominal = self._predict(())
-        self._moves = self._motion_columns()
+        channels = self._nominal.reshape(len(t), -1)[:, :-1]
+        self._moves = motion_columns(motion, t, channels, tacho_noise, _KNOTS_S)
         self._motion_gram = cho_factor((self._moves.T @ self._moves).toarray())
 
     def signature(self, effect: Effect) -> Floats:
@@ -71,19 +71,6 @@ class _Observer:
     def _predict(self, effects: tuple[Effect, ...]) -> Floats:
         channels, reference = self._twin.predict(self._motion, self._t, effects=effects, temperature=self._temperature)
         return np.column_stack([channels / self._white, reference / self._tacho_noise]).ravel()
-
-    def _motion_columns(self) -> csr_array:
-        """Return what the coefficients of a cubic spline of the rate change, (n (c + 1), knots)."""
-        state, t = self._motion.at(self._t), self._t
-        known = np.column_stack([np.ones_like(t), state.acceleration, state.rate**2])
-        channels = self._nominal.reshape(len(t), -1)[:, :-1]
-        _, tangential, centripetal = np.linalg.lstsq(known, channels, rcond=None)[0]  # per channel, in noise
-        knots = np.arange(t[0] - 3 * _KNOTS_S, t[-1] + 4 * _KNOTS_S, _KNOTS_S)
-        count = len(knots) - 4  # of which each touches a second of samples
-        rate = BSpline(knots, np.eye(count), 3, extrapolate=False)
-        b, slope = np.nan_to_num(rate(t)), np.nan_to_num(rate.derivative()(t))  # (n, knots)
-        moved = slope[:, None] * tangential[:, None] + 2.0 * (state.rate[:, None] * b)[:, None] * centripetal[:, None]
-        return csr_array(np.concatenate([moved, b[:, None] / self._tacho_noise], axis=1).reshape(-1, count))
 
 
 def free_distance_and_ties(world: World, tacho_noise: float, least: float) -> tuple[float, dict[str, tuple[str, ...]]]:

@@ -23,6 +23,8 @@ LARGEST_TURN = np.pi / 9
 class Effect(ABC):
     """One thing that is so in the world and missing in the simulation.
 
+    The docstring of each effect holds the words of its page in the catalogue (`sim.effects.description`).
+
     Parameters
     ----------
     parameters : mapping

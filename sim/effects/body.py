@@ -70,8 +70,8 @@ class GyroLatency(Effect):
     :symbols: δ = delay_s
     :size: 2 ms, by choice: group delays of MEMS gyros at bandwidths of some 100 Hz.
     :example: delay_s = 0.002
-    :experiment: Shake the body about one axis with quick reversals. The disagreement of the channels is in proportion
-        to the rate of change of the centripetal and tangential parts.
+    :experiment: Shake the body about one axis with quick reversals: the channels disagree in proportion to the rate of
+        change of the centripetal and tangential parts. A delay that all chips share is the same by another name.
     :recordings: MIMU4444: −1.60 ± 0.02 ms in one recording, −1.62 ± 0.03 ms in the other: the accelerometers lag behind
         the gyros.
     """

@@ -2,8 +2,8 @@
 
 The docstring of an effect has a title, a paragraph that says what it is in a rig, and a section ``Notes`` of fields::
 
-    Notes
-    -----
+Notes
+-----
     :formula: y = f + b
     :symbols: b = {channel}_m_s2
     :size: where the usual size comes from

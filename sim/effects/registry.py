@@ -8,7 +8,7 @@ from typing import Any
 from gfimu.errors import InputError, unknown_name
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.plugins import plugins
-from sim.effects import body, digital, mechanical, rig, sensing, timing
+from sim.effects import body, chain, digital, drifting, mechanical, mounting, rig, sensing, timing
 from sim.effects.base import Effect
 from sim.effects.unknown import Unknown
 from sim.effects.unlisted import UNLISTED
@@ -38,27 +38,27 @@ EFFECTS: dict[str, type[Effect]] = {
         sensing.ScaleFactor,
         mechanical.Misalignment,
         mechanical.SensorPosition,
-        mechanical.Eccentricity,
-        mechanical.MountTilt,
-        mechanical.TableTilt,
-        mechanical.AxisWobble,
-        mechanical.Gravity,
+        mounting.Eccentricity,
+        mounting.MountTilt,
+        mounting.TableTilt,
+        mounting.AxisWobble,
+        mounting.Gravity,
         mechanical.Cogging,
         mechanical.Resonance,
         mechanical.CentrifugalFlex,
-        sensing.SensorLag,
+        chain.SensorLag,
         timing.ChannelSkew,
         timing.ClockError,
         timing.TachoLatency,
         timing.TachoScale,
-        sensing.BiasTemperature,
-        sensing.WarmUp,
+        drifting.BiasTemperature,
+        drifting.WarmUp,
         digital.BiasRandomWalk,
         sensing.Quadratic,
         sensing.CrossAxis,
-        sensing.Hysteresis,
-        sensing.InterferenceTone,
-        sensing.GainDrift,
+        chain.Hysteresis,
+        chain.InterferenceTone,
+        drifting.GainDrift,
         sensing.VibrationRectification,
         timing.TachoRipple,
         digital.Noise,
@@ -75,7 +75,7 @@ EFFECTS: dict[str, type[Effect]] = {
 
 _OF_RIG: tuple[type[Effect], ...] = (
     *(rig.TachoLag, body.ChipDelay, rig.ChipLag, rig.BearingShake, rig.BenchSway),
-    sensing.ColdStart,
+    drifting.ColdStart,
 )
 
 FURTHER_EFFECTS: dict[str, type[Effect]] = {**{effect.name: effect for effect in _OF_RIG}, **UNLISTED}
@@ -132,14 +132,14 @@ NOT_OF_A_CARRIAGE: dict[str, str] = {
 
 CARRIAGE_EFFECTS: dict[str, type[Effect]] = {
     **{name: effect for name, effect in EFFECTS.items() if name not in NOT_OF_A_CARRIAGE},
-    **{one.name: one for one in (mechanical.MountTurn, mechanical.RailTilt)},
+    **{one.name: one for one in (mounting.MountTurn, mounting.RailTilt)},
 }
 """Every effect of an array on a linear axis, by its contract name."""
 
 TABLE_EFFECTS: dict[str, type[Effect]] = EFFECTS | FURTHER_EFFECTS
 """Every effect of a rig on its table whose reference is a rate."""
 
-SIMULATED_EFFECTS: dict[str, type[Effect]] = {sensing.ProofMass.name: sensing.ProofMass}
+SIMULATED_EFFECTS: dict[str, type[Effect]] = {chain.ProofMass.name: chain.ProofMass}
 """What scenarios and twins may have and no diagnosis looks for, as the usual effects hold its limit."""
 
 ENCODER_EFFECTS: dict[str, type[Effect]] = {

@@ -81,7 +81,7 @@ def campaign_picture(
     with mpl.rc_context(_STYLE):
         figure = _figure(f"{folder.name}: {len(table)} of {len(design)} cases", table, design, drawn, len(there))
         with atomic_path(path) as part:
-            if Path(path).suffix == ".html":
+            if Path(path).suffix.lower() == ".html":
                 Path(part).write_text(_page(figure, folder, table, design), encoding="utf-8")
             else:
                 figure.savefig(part, dpi=120, format=Path(path).suffix.lstrip("."), metadata=_metadata(path))
@@ -101,7 +101,7 @@ def _words(name: str) -> str:
 
 
 def _metadata(path: str | Path) -> dict[str, None]:
-    return {"Date": None} if Path(path).suffix != ".png" else {}
+    return {"Date": None} if Path(path).suffix.lower() != ".png" else {}
 
 
 def _figure(title: str, table: pa.Table, design: Design, results: list[str], all_results: int) -> Figure:
@@ -242,6 +242,15 @@ def _draw_bars(axes: Axes, found: Sequence[Sensitivity], seeds: float | None) ->
     axes.set_xlabel("share of the variance")
 
 
+_PAGE_STYLE = (
+    ":root{color-scheme:light dark} body{font-family:sans-serif;margin:min(2em,4vw);overflow-wrap:anywhere} "
+    ".picture{overflow-x:auto;background:#fff;border-radius:6px} "
+    "svg{display:block;max-width:100%;min-width:640px;height:auto} "
+    "@media print{svg{min-width:0}}"
+)
+"""The picture is on white paper by night too, and scrolls within its box on a narrow screen."""
+
+
 def _page(figure: Figure, folder: Path, table: pa.Table, design: Design) -> str:
     """Return a page that needs nothing else: the picture, the counts, the reasons of failures."""
     drawing = io.StringIO()
@@ -251,9 +260,12 @@ def _page(figure: Figure, folder: Path, table: pa.Table, design: Design) -> str:
     name = html.escape(folder.name)
     return (
         f'<!DOCTYPE html><html lang="en"><meta charset="utf-8"><title>Campaign {name}</title>'
-        "<style>body{font-family:sans-serif;margin:2em} svg{max-width:100%;height:auto}</style>"
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<style>{_PAGE_STYLE}</style>"
         f"<h1>Campaign {name}</h1><p>{len(table)} of {len(design)} cases.</p>"
+        '<div class="picture" tabindex="0" role="img" aria-label="results over the factors of the campaign">'
         + svg[svg.index("<svg") :]
+        + "</div>"
         + (f"<h2>Failures</h2><ul>{reasons}</ul>" if reasons else "")
         + "</html>"
     )

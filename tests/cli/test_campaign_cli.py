@@ -91,3 +91,16 @@ def test_a_value_that_goes_with_some_others_only_is_no_warning(tmp_path, recwarn
     """An ADXL355 has no range of 16 g."""
     checked(tmp_path, '[factors]\npart = ["adxl345", "adxl355"]\n"sensor.range_g" = [16, 8]\n')
     assert not recwarn
+
+
+def test_a_campaign_of_which_every_case_failed_is_code_1(gfimu_command, tmp_path):
+    plan = tmp_path / "plan.toml"
+    plan.write_text(
+        'repeats = 1\n[factors]\nscenario = ["paper_run"]\nmethod = ["integrate"]\nduration_s = [0.1]\n'
+        'calibration = ["rest"]\n'
+    )
+    result = gfimu_command("campaign", plan, "--out", tmp_path / "out", "--workers", 1, "--json")
+    assert result.code == 1
+    assert "every case failed" in result.stderr
+    found = json.loads(result.stdout)
+    assert sum(found["failures"].values()) == found["done"] == found["cases"] == 1

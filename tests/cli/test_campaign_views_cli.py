@@ -205,7 +205,7 @@ if __name__ == "__main__":
         time.sleep(0.05)
     os.killpg(started.pid, signal.SIGINT)
     _, said = started.communicate(timeout=20.0)
-    assert started.returncode == 1
+    assert started.returncode == 130
     assert said == "gfimu: interrupted\n"
     assert ends(started.pid, within=5.0)
     names = [file.name for file in (tmp_path / "out").iterdir()]

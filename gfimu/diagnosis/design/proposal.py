@@ -45,6 +45,11 @@ class Proposal:
         The proposal in words.
     scenario : mapping
         Scenario file of the proposed recording.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> gfimu.design("cube12_turntable", ["tacho_scale", "scale_factor"]).to_toml()  # doctest: +SKIP
     """
 
     effects: tuple[str, ...]

@@ -97,6 +97,13 @@ class RunCheck(PlottedResult):
         The twin's effects that have a size, the best seen first; empty for a free body.
     advice : tuple of str
         What one more minute should be.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> seen = gfimu.check(gfimu.simulate("paper_run", seed=1), "cube12_turntable")
+    >>> "bias" in [one.name for one in seen.effects if one.seen]
+    True
     """
 
     runs: tuple[dict[str, Any], ...]

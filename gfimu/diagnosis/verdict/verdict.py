@@ -59,6 +59,12 @@ class NamedCause:
     unlisted : mapping of str to str
         Of an effect that the contract has no name for: its ``place`` in the chain, the ``dependence`` on the motion and
         the ``pattern`` of its sizes. Empty for all others.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> cause = gfimu.diagnose("run.parquet", "cube12_turntable").causes[0]  # doctest: +SKIP
+    >>> cause.parameters, cause.std  # doctest: +SKIP
     """
 
     effect: str
@@ -213,6 +219,13 @@ class Diagnosis(PlottedResult):
         Of a reference that was aligned before the diagnosis: ``offset_s`` (the channels' clock less the reference's at
         the first sample), ``rate_error`` (seconds of the channels' clock per second of the reference's, less one), and
         their standard deviations ``offset_std_s`` and ``rate_error_std``. Empty for all others.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> found = gfimu.diagnose("run.parquet", "cube12_turntable")  # doctest: +SKIP
+    >>> found.verdict, [cause.effect for cause in found.causes]  # doctest: +SKIP
+    >>> found.report("diagnosis")  # doctest: +SKIP
     """
 
     verdict: str
@@ -287,6 +300,12 @@ class Diagnosis(PlottedResult):
         panels = [Panel("residual of each channel", "rms, m/s²", sizes, channels, scale="zero")]
         if self.runs and channels:
             panels.append(self._worst_channel(channels))
+        columns = self.to_columns()
+        known = np.flatnonzero(columns["std"] > 0.0)
+        if known.size:
+            names = tuple(f"{columns['effect'][row]}\n{columns['parameter'][row]}" for row in known)
+            ratios = Series("", (columns["value"] / columns["std"])[known], np.ones(len(known)), role="after")
+            panels.append(Panel("named parameters over their standard deviations, ±2σ", "size / σ", (ratios,), names))
         return panels
 
     def _worst_channel(self, channels: Sequence[str]) -> Panel:

@@ -44,6 +44,13 @@ class AxisBounds(PlottedResult):
         Standard deviation of the rate from one sample, and of a filter that has settled, rad/s.
     predicted : PredictedEstimate, optional
         What the estimate reaches in a run, with the uncertain mounting estimated.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> bounds = gfimu.score("wheel_pair").about_axis[0]
+    >>> print(f"{bounds.filter_std:.4f} rad/s at {bounds.rate_rad_s:.2f} rad/s")
+    0.0038 rad/s at 6.28 rad/s
     """
 
     array: str

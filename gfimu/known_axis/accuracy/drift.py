@@ -63,6 +63,13 @@ class AxisDrift(PlottedResult):
         Cause by cause.
     remark : str
         What bounds the drift, or does not, in words.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> found = gfimu.axis_drift("wheel_pair", time=10.0, noise_ug=290.0, rate=5.0)
+    >>> print(f"rate {found.total[0]:.3f} rad/s, angle {found.total[1]:.3f} rad")
+    rate 0.003 rad/s, angle 0.002 rad
     """
 
     array: str

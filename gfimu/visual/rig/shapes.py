@@ -111,8 +111,12 @@ def axis_shapes(axis: TurningAxis, array: AccelerometerArray) -> Sequence[Shape]
     size, centre = drawing_size(array), package_of(array).centre
     foot = axis.point + ((centre - axis.point) @ axis.direction) * axis.direction
     name = "axis of rotation" if axis.hub == "fixed" else "axis of rotation, hub moves"
-    hub = Cylinder(0.08 * size, 0.3 * size, foot.tolist(), _z_along(axis.direction), TABLE)
-    return [hub, *_long_arrow(foot, axis.direction, size, name)]
+    hub: list[Shape] = [Cylinder(0.08 * size, 0.3 * size, foot.tolist(), _z_along(axis.direction), TABLE)]
+    arm = centre - foot
+    length = float(np.linalg.norm(arm))
+    if length > 2.0 * float(package_of(array).half.max()):  # the body hangs on an arm, of which it is no part
+        hub.append(Cylinder(0.05 * size, length, (foot + 0.5 * arm).tolist(), _z_along(arm / length), METAL))
+    return [*hub, *_long_arrow(foot, axis.direction, size, name)]
 
 
 def table_axis_shapes(array: AccelerometerArray, centre: NDArray[np.float64]) -> Sequence[Shape]:

@@ -70,7 +70,8 @@ rest is right: a sensor at rest reads the reaction to gravity.
 
 **Colours.** {" ".join(one for one in colours if one)} {_HUES}
 
-All plots share the time axis, in seconds. Drag to move, scroll to zoom, double-click to see everything.
+All plots are over the same time, in seconds; those of a run of up to a minute zoom together. Drag to move, scroll to
+zoom, double-click to see everything.
 
 {array_words(array)}
 """

@@ -15,7 +15,7 @@ _MOST = 5  # terms
 
 def answer(task: Task) -> dict[str, Any]:
     """Add the term that lowers BIC most, until none does."""
-    library = LinearLibrary.of(task.recording, task.twin)
+    library = LinearLibrary.of(task.recording, task.twin, free_motion=True)
 
     def score(terms: list[Candidate]) -> float:
         return library.explained(terms) - sum(term.free for term in terms) * log(library.samples)

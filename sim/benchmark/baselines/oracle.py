@@ -16,7 +16,7 @@ __all__ = ["answer"]
 
 
 def answer(task: Task) -> dict[str, Any]:
-    """Name what is hidden, with sizes by least squares at the smoothed tachometer, started at the true ones."""
+    """Name what is hidden, with sizes by least squares, the motion free, started at the true ones."""
     truth = fixed_world(task.world).truth
     if not truth.hidden or truth.place == "nothing":
         return {"verdict": "nothing_found"}

@@ -1,0 +1,110 @@
+"""The first page of the catalogue of effects: the table of all, what the pages' figures mean, how to add one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from effect_formulas import to_latex, vectors_of
+from effect_pages import link
+
+from gfimu.diagnosis.design.proposal import SEPARATED
+from gfimu.diagnosis.policy import Policy
+from sim.effects.base import Effect
+from sim.effects.catalogue import PLACES, place_of
+from sim.effects.description import Description, describe
+
+__all__ = ["index_page"]
+
+_LONGEST = 28  # characters of a formula in the table
+_ANY = Policy().seen
+
+
+def index_page(effects: Mapping[str, type[Effect]], numbers: Mapping[str, Any]) -> str:
+    """Return the table of all effects, by place in the chain."""
+    parts = [
+        "# Catalogue of effects",
+        _INTRODUCTION,
+    ]
+    for place, words in PLACES.items():
+        mine = [effect for effect in effects.values() if place_of(effect) == place]
+        if not mine:
+            continue
+        rows = [
+            "| effect | what is so in the world, missing in the simulation | formula | not separable in a sweep from |"
+        ]
+        rows.append("|---|---|---|---|")
+        for effect in mine:
+            sweep = numbers[effect.name]["motions"].get("speed sweep", {"rivals": []})
+            rivals = [rival for rival, _, nats in sweep["rivals"] if nats < SEPARATED]
+            formula = _inline(describe(effect))
+            summary = effect.summary.replace("|", "\\|")
+            rows.append(f"| {link(effect.name)} | {summary} | {formula} | {', '.join(map(link, rivals))} |")
+        parts += [f"## {place.capitalize()}: {words}", "\n".join(rows)]
+    names = "\n".join(effects)
+    parts += ["## Your own effects", _OWN, f"```{{toctree}}\n:hidden:\n:maxdepth: 1\n\n{names}\n```"]
+    return "\n\n".join(parts) + "\n"
+
+
+_INTRODUCTION = f"""\
+One page per effect that a simulated rig can have and a diagnosis can name: what it is, its formula, what it changes
+in a run, which effects it is confounded with in which motion, and the experiment that separates them.
+`gfimu list effects` lists them; `gfimu show table_tilt` prints the essence of a page.
+
+The chain is: geometry and gravity → motion → sensing → sampling → data. The reading of an ideal sensor whose axis
+is $\\boldsymbol{{a}}$, at the place $\\boldsymbol{{r}}$ from the table's axis $\\boldsymbol{{z}}$, is the specific
+force there along it:
+
+$$
+f = \\boldsymbol{{a}} \\cdot \\boldsymbol{{F}}, \\qquad
+\\boldsymbol{{F}} = g\\,\\boldsymbol{{u}} + \\alpha\\,\\boldsymbol{{z}} \\times \\boldsymbol{{r}}
++ \\omega^2\\,\\boldsymbol{{z}} \\times (\\boldsymbol{{z}} \\times \\boldsymbol{{r}})
+$$
+
+| symbol | meaning | unit |
+|---|---|---|
+| $f$, $y$ | reading of a channel before and after the effect; an index is a channel | m/s² |
+| $\\theta$, $\\omega$, $\\alpha$ | angle, rate and angular acceleration of the table | rad, rad/s, rad/s² |
+| $\\Omega$, $\\Omega'$ | reading of the reference before and after the effect; of a free body the gyro's | rad/s |
+| $\\boldsymbol{{u}}$, $g$ | up, in the table's frame; local gravity | 1, m/s² |
+| $R_z(\\theta)$ | rotation by the angle $\\theta$ about $\\boldsymbol{{z}}$ | |
+| $\\boldsymbol{{\\rho}}$ | place of a chip from the cube's centre | m |
+| $t$, $T$ | time since the run began, temperature of the board | s, °C |
+
+All vectors are in the table's frame, which turns with the array. Each formula is evaluated by a test and compared
+with the forward model.
+
+**Figures on the pages.** *d′* is the size of the effect, in standard deviations, that a motion shows when the
+effect has its usual size and everything else that is unknown (the drive, slow noise) is free. Below {_ANY:.2g} it
+may be missed. *Share* is the part of an effect's whitened energy that a rival explains at its best: the squared
+correlation of their columns after the nuisance parameters. *Nats* is the expected log likelihood by which the
+effect beats the rival; below {SEPARATED:g} two effects are not separable. They are computed as `gfimu check` and
+`gfimu design` do, for `cube12` with ADXL345 chips at 100 Hz. Effects marked ° belong to the wider
+library, which is searched only where the usual effects give no good answer.
+
+Motions: *constant spin*, 30 s at 4 rad/s; *speed sweep*, the scenario `speed_sweep`; *tilted rest*, 60 s at rest,
+30° over; *calibration poses*, 18 rests of 6 s with faces and edges up; *tumble* and *in the hand*, the scenarios
+`tumble` and `hand` as a free body with a gyro; *strokes*, the scenario `linear_axis`."""
+
+_OWN = """\
+The pages are made from the code: the words from the docstring of the effect's class (fields under *Notes*, see
+`sim/effects/description.py`), the figures from what the package computes. A new effect is a class, its line in
+`sim/effects/registry.py`, and
+```
+python docs/scripts/make_effect_catalogue.py --compute --effect my_effect
+```
+A test fails as long as a registered effect has no page, picture or formula. A point of the grammar in
+`sim/effects/unlisted_rig.py` or `unlisted_chips.py` is registered in `unlisted.py` and gets its page in the same way.
+For effects that an installed package adds (entry point `gfimu.effects`), `--out FOLDER` writes their pages into a
+folder of that package; `gfimu show` prints what the docstring says. Their rivals are computed with gfimu's own effects,
+as the twin has them all. What a diagnosis calls `unknown` has the page of that name."""
+
+
+def _inline(text: Description) -> str:
+    """Return the last equation, or for a long one the first, for a cell of the table."""
+    short = min(text.formula, key=len) if len(text.formula[-1]) > _LONGEST else text.formula[-1]
+    if len(short) > _LONGEST or (short != text.formula[-1] and short.partition(" = ")[0] not in ("y", "n")):
+        return ""
+    return f"${to_latex(short, vectors_of(text.formula, text.symbols))}$".replace("left|", "left\\vert ").replace(
+        "right|", "right\\vert "
+    )

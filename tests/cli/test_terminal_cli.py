@@ -1,0 +1,152 @@
+"""On a terminal: progress, colour, width. In a pipe: neither, and silence when the reader leaves."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import select
+import subprocess
+import sys
+import time
+
+import pytest
+
+pty = pytest.importorskip("pty")
+fcntl = pytest.importorskip("fcntl")
+termios = pytest.importorskip("termios")
+
+PROGRAM = [sys.executable, "-c", "from gfimu.cli import main; main()"]
+LONG = ("drift", "--bias-mg", "10", "--duration", "20", "--monte-carlo", "60")
+CODE = re.compile(rb"\x1b\[")
+
+
+def on_terminal(*words, columns=80, **environment):
+    """Run the program with standard output and error on a pseudo-terminal; return exit code and what it shows."""
+    master, slave = pty.openpty()
+    termios.tcsetwinsize(slave, (40, columns))
+    kept = {key: value for key, value in os.environ.items() if key not in {"COLUMNS", "NO_COLOR", "FORCE_COLOR"}}
+    process = subprocess.Popen(
+        [*PROGRAM, *words], stdout=slave, stderr=slave, stdin=slave, env={**kept, "TERM": "xterm", **environment}
+    )
+    os.close(slave)
+    shown = b""
+    while True:
+        if select.select([master], [], [], 0.1)[0]:
+            try:
+                piece = os.read(master, 65536)
+            except OSError:
+                break
+            if not piece:
+                break
+            shown += piece
+        elif process.poll() is not None:
+            break
+    os.close(master)
+    return process.wait(), shown
+
+
+def in_pipe(*words, **environment):
+    return subprocess.run(
+        [*PROGRAM, *words], capture_output=True, env={**os.environ, **environment}, check=False, timeout=300
+    )
+
+
+def test_a_terminal_shows_progress_and_clears_it():
+    code, shown = on_terminal(*LONG)
+    assert code == 0
+    assert b"Monte Carlo" in shown
+    assert "━".encode() in shown
+    assert CODE.search(shown)
+    assert b"\x1b[2K" in shown  # the bar is cleared at the end
+
+
+def test_a_pipe_shows_neither_progress_nor_colour():
+    done = in_pipe(*LONG)
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert not CODE.search(done.stdout)
+    assert b"Monte Carlo," in done.stdout  # the row of the table
+
+
+def test_json_on_a_terminal_is_json_beside_the_progress():
+    _, shown = on_terminal(*LONG, "--json")
+    text = re.sub(rb"\x1b\[[0-9;?]*[A-Za-z]", b"", shown).decode()
+    assert '"relative_sampling_error"' in text
+
+
+def test_no_color_is_honoured():
+    code, shown = on_terminal("score", "cube12", NO_COLOR="1")
+    assert code == 0
+    assert not re.search(rb"\x1b\[[0-9;]*3[0-9]m", shown)
+
+
+@pytest.mark.parametrize("columns", [40, 80])
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("score", "cube12", "p3_three_plus_one"),
+        ("list", "effects"),
+        ("drift", "--bias-mg", "10"),
+    ],
+    ids=lambda words: words[0],
+)
+def test_a_table_fits_the_terminal(columns, words):
+    code, shown = on_terminal(*words, columns=columns)
+    assert code == 0
+    text = re.sub(rb"\x1b\[[0-9;?]*[A-Za-z]", b"", shown).decode()
+    rows = [line for line in text.replace("\r", "").splitlines() if line.startswith(("│", "┃", "┏", "└", "┡"))]
+    assert rows or columns == 40
+    assert max(map(len, rows), default=0) <= columns
+    assert "…" not in "".join(rows)  # folded, not cut
+
+
+def test_a_wide_table_on_a_narrow_terminal_breaks_no_number():
+    code, shown = on_terminal("score", "cube12", columns=40)
+    assert code == 0
+    text = re.sub(rb"\x1b\[[0-9;?]*[A-Za-z]", b"", shown).decode().replace("\r", "")
+    assert "array: cube12\n  axes: 12\n  κ(J): 1.4142\n" in text
+
+
+@pytest.mark.parametrize("words", [("list", "effects"), ("--help",), ("show", "adxl355"), ("schema", "diagnose")])
+def test_a_reader_that_leaves_ends_the_program_in_silence(words):
+    read, write = os.pipe()
+    process = subprocess.Popen([*PROGRAM, *words], stdout=write, stderr=subprocess.PIPE)
+    os.close(write)
+    os.close(read)
+    assert process.communicate(timeout=60)[1] == b""
+    assert process.returncode in {0, 1}
+
+
+@pytest.mark.parametrize(
+    "environment",
+    [{"PYTHONIOENCODING": "ascii"}, {"LC_ALL": "C", "LANG": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}],
+)
+@pytest.mark.parametrize(
+    "words", [("score", "cube12"), ("score", "Ω"), ("estimate", "--help"), ("--help",), ("score", "cube12", "--json")]
+)
+def test_a_plain_encoding_is_no_error(words, environment):
+    done = in_pipe(*words, **environment)
+    assert done.returncode == (2 if "Ω" in words else 0)
+    assert b"UnicodeEncodeError" not in done.stderr
+    if "--help" not in words:  # help is written as UTF-8 where the encoding can't hold it
+        (done.stdout + done.stderr).decode("ascii")
+
+
+def test_a_command_without_work_shows_no_bar_in_a_pipe_and_loads_no_rich():
+    code = """
+import sys
+from gfimu.cli.output import progress
+with progress("working", total=1.0) as done:
+    done(0.5)
+assert not [name for name in sys.modules if name.startswith("rich")]
+"""
+    subprocess.run([sys.executable, "-c", code], stderr=subprocess.PIPE, check=True)
+
+
+def test_progress_names_what_is_done():
+    began = time.monotonic()
+    with contextlib.suppress(subprocess.TimeoutExpired):
+        code, shown = on_terminal("optimize", "--chips", "4", "--restarts", "2")
+        assert code == 0
+        assert b"searching arrays" in shown
+    assert time.monotonic() - began < 120
