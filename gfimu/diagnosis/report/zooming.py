@@ -19,7 +19,7 @@ from gfimu.visual.plots import broken_at_gaps
 __all__ = ["dependence_plot", "residual_plot", "spectrum_plot"]
 
 _MOST_SAMPLES = 900_000  # of all channels together that are stored one by one; of more, the envelopes are
-_MOST_GROUPS = 300_000  # of all channels together
+_MOST_GROUPS = 140_000  # of all channels together: 1.2 MB
 _FINENESS = 8.0  # steps that values are rounded to, in a standard deviation of the noise
 _SMOOTH_S = 0.15
 _SHOWN_FIRST = 3  # channels
