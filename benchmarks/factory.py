@@ -1,4 +1,4 @@
-"""How long a measured world of 40 s takes, by the factory and by `sim.campaign.measure`, in one run.
+"""How long a measured world of 40 s takes, by the factory and by `sim.worlds.hidden.measure`, in one run.
 
 python benchmarks/factory.py [COUNT]
 """
@@ -16,9 +16,9 @@ from collections.abc import Callable  # noqa: E402
 
 import numpy as np  # noqa: E402
 
-from sim.campaign import measure  # noqa: E402
-from sim.factory import WorldFactory  # noqa: E402
 from sim.twin import Twin  # noqa: E402
+from sim.worlds.factory import WorldFactory  # noqa: E402
+from sim.worlds.hidden import measure  # noqa: E402
 
 
 def main(count: int) -> None:
@@ -28,9 +28,7 @@ def main(count: int) -> None:
     factory.measure(np.random.default_rng(0))  # compiles
     by_factory = _median(lambda seed: factory.measure(np.random.default_rng(seed)), count)
     by_campaign = _median(lambda seed: measure(np.random.default_rng(seed), twin), max(count // 10, 20))
-    print(
-        f"factory {by_factory:.2f} ms, sim.campaign.measure {by_campaign:.2f} ms, ratio {by_campaign / by_factory:.1f}"
-    )
+    print(f"factory {by_factory:.2f} ms, hidden.measure {by_campaign:.2f} ms, ratio {by_campaign / by_factory:.1f}")
 
 
 def _median(make: Callable[[int], object], count: int) -> float:

@@ -14,7 +14,7 @@ import numpy as np
 
 from gfimu.geometry.array import AccelerometerArray
 from sim import forward
-from sim.profiles import Tumble, speed_sweep, spin_profile
+from sim.motions.profiles import Tumble, speed_sweep, spin_profile
 from sim.rigs.driven import drive
 from sim.rigs.turntable import prescribed_readings
 from sim.scenarios import Scenario, simulate

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from gfimu.geometry.kinematics import omega_products
 from gfimu.motion.body_drive import BodyDrive
-from sim.motion import SpinState
+from sim.motions.motion import SpinState
 from sim.world import SampleContext, World
 
 __all__ = ["body_channels"]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.geometry.kinematics import omega_products, specific_force
-from sim.motion import BodyState
+from sim.motions.motion import BodyState
 
 __all__ = ["earth_in_body", "earth_readings"]
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from gfimu.world_model import SpinState
-from sim.motion import SpinMotion
+from sim.motions.motion import SpinMotion
 from sim.world import Nod, SampleContext, World
 
 __all__ = [

@@ -17,9 +17,9 @@ from scipy.interpolate import CubicSpline
 from gfimu import world_model
 from gfimu.errors import InputError
 from sim import forward
-from sim.adxl345 import Sensor, conversion_offsets
-from sim.data_sheet import DataSheet
-from sim.motion import SpinMotion, SpinState
+from sim.chips.adxl345 import Sensor, conversion_offsets
+from sim.chips.data_sheet import DataSheet
+from sim.motions.motion import SpinMotion, SpinState
 from sim.rigs.driven import drive
 from sim.rigs.turntable import prescribed_readings
 from sim.scenarios import Scenario

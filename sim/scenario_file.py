@@ -17,10 +17,10 @@ from gfimu.geometry.array import AccelerometerArray
 from gfimu.geometry.gravity import local_gravity
 from gfimu.motion.earth import EarthRotation
 from gfimu.units import STANDARD_GRAVITY
-from sim.adxl345 import SensorSettings
-from sim.data_sheet import DataSheet
+from sim.chips.adxl345 import SensorSettings
+from sim.chips.data_sheet import DataSheet
 from sim.effect_table import EffectTable
-from sim.motion_file import MotionTable, ProfileTable
+from sim.motions.motion_file import MotionTable, ProfileTable
 from sim.rigs.dc_motor import DcMotor
 from sim.rigs.motor_file import MotorTable
 from sim.twin_file import Inclination

@@ -22,13 +22,13 @@ from gfimu.recording.carried_array import array_metadata
 from gfimu.short_repr import short_repr
 from gfimu.units import STANDARD_GRAVITY
 from sim import forward
-from sim.adxl345 import Sensor, SensorSettings
-from sim.carried import Carriage, Wheel
-from sim.conversions import conversion_groups
+from sim.chips.adxl345 import Sensor, SensorSettings
+from sim.chips.conversions import conversion_groups
 from sim.earth import earth_in_body
 from sim.effects import NOT_OF_A_CARRIAGE, Effect, apply_effects
 from sim.effects.unlisted import Unlisted
-from sim.motion import BodyMotion, BodyState, SpinMotion, SpinState
+from sim.motions.carried import Carriage, Wheel
+from sim.motions.motion import BodyMotion, BodyState, SpinMotion, SpinState
 from sim.rigs.dc_motor import DcMotor
 from sim.rigs.driven import drive
 from sim.rigs.turntable import prescribed_readings

@@ -13,7 +13,7 @@ from gfimu.errors import InputError
 from gfimu.recording import Recording
 from gfimu.world_model import SpinState
 from sim.forward import nodding_motion
-from sim.motion import BodyState
+from sim.motions.motion import BodyState
 from sim.world import World
 
 if TYPE_CHECKING:

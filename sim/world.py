@@ -22,7 +22,7 @@ from gfimu.geometry.array import AccelerometerArray
 from gfimu.short_repr import short_repr
 from gfimu.units import STANDARD_GRAVITY
 from gfimu.world_model import SpinState
-from sim.motion import SpinMotion
+from sim.motions.motion import SpinMotion
 
 __all__ = ["DataStep", "Lean", "MotionStep", "Nod", "ReferenceStep", "SampleContext", "SensingStep", "Shake", "World"]
 

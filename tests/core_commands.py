@@ -109,10 +109,10 @@ def write_inputs() -> None:
     import numpy as np
 
     from gfimu import AccelerometerArray, Recording
-    from sim.campaign import Measurement
     from sim.effects import make_effect
-    from sim.factory import WorldFactory
     from sim.twin import Twin
+    from sim.worlds.factory import WorldFactory
+    from sim.worlds.hidden import Measurement
 
     rng = np.random.default_rng(1)
     world = WorldFactory(Twin.load("cube12_turntable"), Measurement(duration=20.0))

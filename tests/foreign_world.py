@@ -29,10 +29,10 @@ from sim.benchmark.generators.foreign_world import (
 )
 from sim.benchmark.generators.independent_table import INERTIA, LEAD
 from sim.benchmark.generators.independent_world import HiddenRun, Setting
-from sim.campaign import Measurement, measure, random_profile
-from sim.motion import SplineSpin
+from sim.motions.motion import SplineSpin
 from sim.study.cases import Case
 from sim.twin import Twin
+from sim.worlds.hidden import Measurement, measure, random_profile
 
 __all__ = ["CASES", "SIZES", "hide", "hide_in_campaign", "new_recording"]
 

@@ -14,9 +14,9 @@ from gfimu.files.model_files import list_models
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.parts.limits import PartLimits
 from gfimu.parts.part import Part
-from sim.data_sheet import DataSheet
+from sim.chips.data_sheet import DataSheet
 from sim.effects import Effect
-from sim.motion import SplineSpin
+from sim.motions.motion import SplineSpin
 from sim.scenarios import Scenario
 from sim.twin import Twin
 

@@ -156,7 +156,7 @@ def test_firmware_bridge_imports_recordings_and_the_chip_only():
     assert not offences(
         lambda module: inside(module, "firmware_bridge"),
         lambda name: (
-            (inside(name, "sim") and not inside(name, "sim.adxl345"))
+            (inside(name, "sim") and not inside(name, "sim.chips.adxl345"))
             or inside(name, "gfimu.cli", "gfimu.diagnosis", "gfimu.calibration", "gfimu.visual", "mujoco")
         ),
     )
@@ -333,7 +333,7 @@ ROOMS = {
         "firmware_bridge.lpc1768",
         "gfimu.geometry.array",
         "gfimu.recording",
-        "sim.adxl345",
+        "sim.chips.adxl345",
     },
     "firmware_bridge.sender": {"firmware_bridge.lpc1768.build"},
     "firmware_bridge.sources": {"firmware_bridge.frames", "gfimu.geometry.array", "gfimu.importing.piece"},

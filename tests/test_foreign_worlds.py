@@ -35,7 +35,7 @@ from sim.benchmark.generators.foreign_world import distance, sized, table_motion
 from sim.benchmark.generators.independent_effects import CHANNELS, DRAWS, EXOTICS
 from sim.benchmark.generators.independent_world import Setting
 from sim.effects import EFFECTS
-from sim.motion import SplineSpin
+from sim.motions.motion import SplineSpin
 from sim.study.cases import Case
 from sim.study.outcome import draw_world
 from sim.twin import Twin

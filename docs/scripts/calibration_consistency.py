@@ -27,8 +27,8 @@ from gfimu.geometry.kinematics import specific_force
 from gfimu.recording import Recording
 from gfimu.recording.carried_array import array_metadata
 from gfimu.units import STANDARD_GRAVITY
-from sim.adxl345 import Sensor, SensorSettings
-from sim.pose_sequence import PoseSequence
+from sim.chips.adxl345 import Sensor, SensorSettings
+from sim.motions.pose_sequence import PoseSequence
 
 RATE = 100.0
 CASES = (

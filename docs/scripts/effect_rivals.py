@@ -31,8 +31,8 @@ from gfimu.diagnosis.fit.linear import Point, linearise
 from gfimu.diagnosis.policy import Policy
 from gfimu.errors import InputError
 from sim.effects import make_effect
-from sim.motion import SplineSpin
-from sim.pose_sequence import PoseSequence
+from sim.motions.motion import SplineSpin
+from sim.motions.pose_sequence import PoseSequence
 from sim.scenarios import Scenario, simulate
 from sim.twin import Twin
 from sim.world import World

@@ -24,7 +24,7 @@ from PIL import Image
 from gfimu.geometry.array import AccelerometerArray
 from sim.effects import make_effect
 from sim.effects.grammar import TURNS
-from sim.motion import SpinState
+from sim.motions.motion import SpinState
 from sim.scenarios import Scenario
 from sim.twin import Twin
 from sim.world import World

@@ -39,12 +39,12 @@ OTHERS = {
         {
             "sim.scenarios": ("simulate",),
             "sim.world": ("World",),
-            "sim.motion": ("SpinMotion", "BodyMotion", "SpinState", "BodyState"),
-            "sim.profiles": ("spin_profile", "Hold", "Ramp", "Sine", "Chirp", "Tumble"),
-            "sim.adxl345": ("Sensor", "SensorErrors", "SensorSettings"),
-            "sim.data_sheet": ("DataSheet",),
+            "sim.motions.motion": ("SpinMotion", "BodyMotion", "SpinState", "BodyState"),
+            "sim.motions.profiles": ("spin_profile", "Hold", "Ramp", "Sine", "Chirp", "Tumble"),
+            "sim.chips.adxl345": ("Sensor", "SensorErrors", "SensorSettings"),
+            "sim.chips.data_sheet": ("DataSheet",),
             "sim.effects": ("Effect",),
-            "sim.factory": ("WorldFactory", "MeasuredWorld"),
+            "sim.worlds.factory": ("WorldFactory", "MeasuredWorld"),
         },
     ),
     "firmware_bridge": (

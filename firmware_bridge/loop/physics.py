@@ -1,7 +1,7 @@
 """Physics for the emulated board: what each conversion of each chip yields.
 
-The sensing chain is that of `sim.adxl345`, up to the point where the register-level chip takes over: range, resolution
-and justification are applied there, when a register is read.
+The sensing chain is that of `sim.chips.adxl345`, up to the point where the register-level chip takes over: range,
+resolution and justification are applied there, when a register is read.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from firmware_bridge.adxl345.registers import RAW_PER_COUNT, TICKS_PER_SECOND
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
-from sim.adxl345 import Sensor
+from sim.chips.adxl345 import Sensor
 
 __all__ = ["Conversions", "RestPhysics", "RidePhysics", "Scene"]
 

@@ -220,7 +220,7 @@ def _setting(case: Case) -> tuple[Scenario, str, str]:
 def _calibrated(scenario: Scenario, seed: int) -> Calibration:
     """Calibrate the chips of a scenario from poses: the same seed draws the same chips."""
     from gfimu.calibration.array_calibration import calibrate_array
-    from sim.pose_sequence import PoseSequence
+    from sim.motions.pose_sequence import PoseSequence
     from sim.scenarios import simulate
 
     sequence = PoseSequence()

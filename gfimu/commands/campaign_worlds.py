@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from gfimu.commands.campaign_effects import FORMS, drawn_effects, names_effect
 from gfimu.errors import GeometryError, InputError, unknown_name
 from gfimu.units import MILLI_G
-from sim.campaign import Measurement, hidden_effect
 from sim.effects import EFFECTS, Effect
-from sim.factory import WorldFactory
 from sim.twin import Twin
+from sim.worlds.factory import WorldFactory
+from sim.worlds.hidden import Measurement, hidden_effect
 
 if TYPE_CHECKING:
     from sim.sweep.design import Case
@@ -52,7 +52,7 @@ class _Solution:
 
 
 def measure_case(case: Case) -> Mapping[str, float]:
-    """Measure a world of `sim.factory`, and compare the linear solution of the nominal array with the truth.
+    """Measure a world of `sim.worlds.factory`, and compare the linear solution of the nominal array with the truth.
 
     Factors: ``twin``, ``duration_s``, ``sample_rate_hz``, ``bias_instability_mg``, ``tacho_noise_rad_s``; ``effect``
     (hidden by chance with the size ``d_prime``); ``EFFECT.KEY``, a parameter of an effect such as ``table_tilt.x_rad``;
@@ -138,7 +138,7 @@ def _effects(case: Case, factory: WorldFactory) -> list[Effect]:
     if hidden != "none":
         if hidden not in EFFECTS:
             raise unknown_name("effect", hidden, ("none", *EFFECTS))
-        from sim.campaign import random_profile
+        from sim.worlds.hidden import random_profile
 
         size = _number(case.values, "d_prime", _D_PRIME)
         effects.append(hidden_effect(rng, twin, hidden, random_profile(rng, setting.duration), size, setting))

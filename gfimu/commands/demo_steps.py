@@ -218,7 +218,7 @@ def calibrate_chips(demo: Demo) -> None:
 
     from gfimu.calibration.array_calibration import calibrate_array
     from gfimu.motion.estimation import estimate
-    from sim.pose_sequence import PoseSequence
+    from sim.motions.pose_sequence import PoseSequence
     from sim.scenarios import simulate
 
     array, gravity = demo.scenario.array, demo.scenario.gravity

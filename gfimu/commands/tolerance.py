@@ -242,7 +242,7 @@ def tolerance(
     from gfimu.tolerances.tolerances import ChipErrors, Tolerances
     from gfimu.units import MILLI_G
     from sim.sweep.executors import processors
-    from sim.toleranced import known_motion_of
+    from sim.worlds.toleranced import known_motion_of
 
     _check("--position-mm", position_mm)
     _check("--angle-deg", angle_deg)
@@ -311,7 +311,7 @@ def _run(
 ) -> tuple[Scenario, str]:
     """Return the run with the array as drawn and nothing wrong in it, and what it is in words."""
     from sim.scenarios import Scenario
-    from sim.toleranced import LEAST_TIME_S, REST_S, reference_motion
+    from sim.worlds.toleranced import LEAST_TIME_S, REST_S, reference_motion
 
     if scenario is None:
         length = _USUAL_TIME_S if duration is None else duration
@@ -344,7 +344,7 @@ def _poses(run: Scenario) -> tuple[Scenario, Poses]:
     import numpy as np
 
     from gfimu.tolerances.calibrated import Poses
-    from sim.pose_sequence import POSE_SETS, PoseSequence
+    from sim.motions.pose_sequence import POSE_SETS, PoseSequence
 
     sequence = PoseSequence()
     period = sequence.rest + sequence.turn

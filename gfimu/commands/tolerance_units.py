@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from gfimu.tolerances.known_motion import KnownMotion
     from gfimu.tolerances.tolerances import Tolerances
     from sim.scenarios import Scenario
-    from sim.toleranced import ToleranceUnit
+    from sim.worlds.toleranced import ToleranceUnit
 
 __all__ = ["UnitErrors", "UnitTask", "simulate_units"]
 
@@ -129,8 +129,8 @@ def _gather(found: Sequence[dict[str, float] | str]) -> UnitErrors:
 
 def unit_rows(task: UnitTask, numbers: Sequence[int]) -> list[_Row]:
     """Simulate some units, given their numbers, and return the errors of each."""
-    from sim.adxl345 import SensorErrors
-    from sim.toleranced import ToleranceUnit, known_motion_of
+    from sim.chips.adxl345 import SensorErrors
+    from sim.worlds.toleranced import ToleranceUnit, known_motion_of
 
     array = task.scenario.array
     motion = known_motion_of(task.scenario)
@@ -141,7 +141,7 @@ def unit_rows(task: UnitTask, numbers: Sequence[int]) -> list[_Row]:
 
 
 def _row(task: UnitTask, number: int, motion: KnownMotion, reference: Estimate) -> _Row:
-    from sim.toleranced import CALIBRATED_AT, draw_unit
+    from sim.worlds.toleranced import CALIBRATED_AT, draw_unit
 
     # Streams of their own: which calibrations are asked for changes no unit.
     drawing, of_run, of_poses = (np.random.default_rng([task.seed, number, stream]) for stream in range(3))

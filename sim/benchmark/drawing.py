@@ -19,12 +19,12 @@ from sim.benchmark.generators import independent_world as table_world
 from sim.benchmark.release import Case
 from sim.benchmark.unlisted import UNLISTED_TRUTH
 from sim.benchmark.world import FreshMotion, Task, Truth, World
-from sim.campaign import Measurement, detectability, hidden_effect, measure, random_profile, temperature_course
 from sim.effects import Effect, make_effect
-from sim.motion import SpinMotion, SplineSpin
+from sim.motions.motion import SpinMotion, SplineSpin
 from sim.rigs.dc_motor import DcMotor
 from sim.rigs.driven import drive
 from sim.twin import Twin
+from sim.worlds.hidden import Measurement, detectability, hidden_effect, measure, random_profile, temperature_course
 
 __all__ = ["FORMLESS", "draw", "fresh_motion", "nominal_twin"]
 

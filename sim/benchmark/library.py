@@ -22,7 +22,7 @@ from scipy.stats import norm
 
 from gfimu.recording import Recording
 from sim.effects import Effect
-from sim.motion import SpinMotion, SplineSpin
+from sim.motions.motion import SpinMotion, SplineSpin
 from sim.twin import Twin
 
 __all__ = ["Block", "Candidate", "FreeDrive", "KnownDrive", "LinearLibrary", "fitted_sizes", "motion_columns"]

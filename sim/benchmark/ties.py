@@ -16,7 +16,7 @@ from sim.benchmark.drawing import FORMLESS
 from sim.benchmark.library import motion_columns
 from sim.benchmark.world import World
 from sim.effects import Effect, make_effect
-from sim.motion import SpinMotion
+from sim.motions.motion import SpinMotion
 from sim.twin import Twin
 
 __all__ = ["LEAST_SEPARABLE", "free_distance_and_ties"]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gfimu.recording import Recording
 from gfimu.short_repr import short_repr
 from sim.effects import Effect
-from sim.motion import SpinMotion
+from sim.motions.motion import SpinMotion
 from sim.twin import Twin
 
 __all__ = ["FreshMotion", "Task", "Truth", "World"]

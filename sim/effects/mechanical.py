@@ -14,7 +14,7 @@ from gfimu.units import NUMBER, RATIO
 from sim.effects.base import LARGEST_TURN, Effect, Pattern, Size, chip_patterns
 from sim.effects.scans import mode_shapes, order_shapes, per_acceleration
 from sim.effects.table_dynamics import Mode, RippledSpin, TwistingSpin
-from sim.motion import SpinMotion
+from sim.motions.motion import SpinMotion
 from sim.world import World
 
 __all__ = ["CentrifugalFlex", "Cogging", "Misalignment", "Resonance", "SensorPosition"]

@@ -10,7 +10,7 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 from scipy.signal import cont2discrete, lfilter
 
-from sim.motion import SpinMotion, SpinState
+from sim.motions.motion import SpinMotion, SpinState
 
 __all__ = ["Mode", "RippledSpin", "TwistingSpin"]
 

@@ -20,7 +20,7 @@ from scipy.interpolate import CubicHermiteSpline, PPoly
 from gfimu import world_model
 from gfimu.errors import InputError
 from gfimu.short_repr import short_repr
-from sim.motion import SpinMotion, SpinState, SplineSpin
+from sim.motions.motion import SpinMotion, SpinState, SplineSpin
 from sim.rigs.dc_motor import MOTOR_FILE, DcMotor
 from sim.rigs.mujoco_warnings import mujoco_warnings
 from sim.rigs.rig_model import SPIN_JOINT, channel_places, turntable_spec

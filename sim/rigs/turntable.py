@@ -19,7 +19,7 @@ from scipy.spatial.transform import Rotation
 from gfimu import world_model
 from sim.earth import earth_readings
 from sim.forward import arm_growth, lean_states
-from sim.motion import BodyMotion, BodyState, SpinMotion
+from sim.motions.motion import BodyMotion, BodyState, SpinMotion
 from sim.rigs.mujoco_warnings import mujoco_warnings
 from sim.rigs.rig_model import (
     LEAN_JOINT,

@@ -22,12 +22,12 @@ from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
 from gfimu.short_repr import short_repr
 from gfimu.units import MILLI_G
-from sim.campaign import Measurement, detectability, hidden_effect, measure, random_profile
 from sim.effects import Effect, make_effect
-from sim.motion import SpinMotion
+from sim.motions.motion import SpinMotion
 from sim.study.bodies import body_twin, draw_body
 from sim.study.cases import Case
 from sim.twin import Twin
+from sim.worlds.hidden import Measurement, detectability, hidden_effect, measure, random_profile
 
 __all__ = ["HiddenWorld", "SmallerLibrary", "draw_world", "load_generator", "outcome_of", "run_case"]
 

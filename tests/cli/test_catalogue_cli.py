@@ -12,7 +12,7 @@ from gfimu.geometry.array import AccelerometerArray
 from gfimu.importing import load_map
 from gfimu.parts.part import Part
 from gfimu.uncertainty.stage import Stage
-from sim.data_sheet import DataSheet
+from sim.chips.data_sheet import DataSheet
 from sim.scenarios import Scenario
 from sim.sweep.plan import load_plan
 from sim.twin import Twin

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from gfimu import AccelerometerArray, Recording
-from sim.campaign import Measurement, measure, random_profile
 from sim.effects import make_effect
-from sim.motion import SplineSpin
+from sim.motions.motion import SplineSpin
 from sim.scenarios import Scenario, simulate
 from sim.twin import Twin
+from sim.worlds.hidden import Measurement, measure, random_profile
 
 TWIN = "cube12_turntable"
 FILES = {"verdict.json", "twin.toml", "report.html", "diagnosis.rrd"}

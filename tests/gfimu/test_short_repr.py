@@ -11,7 +11,7 @@ from gfimu.diagnosis.design.distinguishability import Distinguishability
 from gfimu.geometry.linear_solution import linear_solution
 from gfimu.parts.part import Part
 from gfimu.short_repr import short_repr
-from sim.data_sheet import DataSheet
+from sim.chips.data_sheet import DataSheet
 from sim.scenarios import Scenario
 from sim.twin import Twin
 

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
-from sim.adxl345 import Sensor, SensorErrors, SensorSettings, conversion_offsets, draw_errors, flicker, quantise
-from sim.data_sheet import DataSheet
+from sim.chips.adxl345 import Sensor, SensorErrors, SensorSettings, conversion_offsets, draw_errors, flicker, quantise
+from sim.chips.data_sheet import DataSheet
 
 MG = 9.80665e-3
 LSB = 3.9 * MG

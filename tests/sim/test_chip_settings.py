@@ -8,8 +8,8 @@ import pytest
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.parts.part import white_noise_std
-from sim.adxl345 import Sensor, SensorSettings
-from sim.conversions import conversion_groups
+from sim.chips.adxl345 import Sensor, SensorSettings
+from sim.chips.conversions import conversion_groups
 from sim.ride import Ride
 from sim.scenarios import Scenario, simulate
 from sim.twin import Twin

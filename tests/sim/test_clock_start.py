@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from gfimu.world_model import SpinState
-from sim.campaign import random_profile
 from sim.effects import make_effect
 from sim.twin import Twin
+from sim.worlds.hidden import random_profile
 
 TWIN = Twin.load("cube12_turntable")
 FAST = make_effect("clock_error", {"ratio": 0.004})

@@ -11,8 +11,8 @@ from gfimu.errors import InputError
 from gfimu.files.model_files import find_model
 from gfimu.geometry.array import AccelerometerArray
 from sim import forward
-from sim.motion import SpinState
-from sim.profiles import Hold, Ramp, spin_profile
+from sim.motions.motion import SpinState
+from sim.motions.profiles import Hold, Ramp, spin_profile
 from sim.rigs.dc_motor import DcMotor
 from sim.rigs.driven import Drive, drive
 from sim.scenarios import Scenario

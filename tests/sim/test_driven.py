@@ -9,7 +9,7 @@ from mujoco.batch import Batch, SimulationError
 
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
-from sim.profiles import Hold, Ramp, spin_profile
+from sim.motions.profiles import Hold, Ramp, spin_profile
 from sim.rigs.dc_motor import DcMotor
 from sim.rigs.driven import Drive, drive, drive_all
 from sim.rigs.rig_model import channel_places

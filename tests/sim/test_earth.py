@@ -8,7 +8,7 @@ import gfimu
 from gfimu import AccelerometerArray, EarthRotation
 from gfimu.geometry.gravity import EARTH_RATE, local_gravity
 from sim.earth import earth_readings
-from sim.motion import BodyState
+from sim.motions.motion import BodyState
 from sim.scenarios import Scenario, simulate
 
 LATITUDE = 35.7

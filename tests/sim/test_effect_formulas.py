@@ -17,7 +17,7 @@ from sim.effects import BODY_EFFECTS, CARRIAGE_EFFECTS, INCLINED_EFFECTS, SIMULA
 from sim.effects.description import describe
 from sim.effects.mounting import RailTilt
 from sim.effects.unknown import Unknown
-from sim.motion import SpinState
+from sim.motions.motion import SpinState
 from sim.scenarios import Scenario, simulate
 from sim.twin import Twin
 from sim.world import World

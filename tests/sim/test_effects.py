@@ -19,15 +19,15 @@ from sim import forward
 from sim.benchmark.generators.independent_effects import DRAWS, SIZELESS, rig_with
 from sim.benchmark.generators.independent_table import Rig, TableRun, drive_table
 from sim.benchmark.generators.independent_world import Setting, noise_free
-from sim.campaign import random_profile
 from sim.effects import EFFECTS, Effect, apply_effects, make_effect
 from sim.effects.low_pass import low_pass, mass_on_spring
-from sim.motion import SpinState, SplineSpin
-from sim.profiles import Chirp, Hold, Ramp, spin_profile
+from sim.motions.motion import SpinState, SplineSpin
+from sim.motions.profiles import Chirp, Hold, Ramp, spin_profile
 from sim.rigs.rig_model import turntable_model
 from sim.rigs.turntable import prescribed_readings
 from sim.twin import Twin
 from sim.world import SampleContext, World
+from sim.worlds.hidden import random_profile
 
 # The contract's names with one valid set of parameters each.
 CONTRACT = {

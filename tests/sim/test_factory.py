@@ -1,14 +1,14 @@
-"""The factory of worlds: what it makes has the distribution of `sim.campaign.measure`."""
+"""The factory of worlds: what it makes has the distribution of `sim.worlds.hidden.measure`."""
 
 import numpy as np
 import pytest
 
 from gfimu.errors import InputError
 from sim import forward
-from sim.campaign import Measurement, measure, random_profile
 from sim.effects import make_effect
-from sim.factory import WorldFactory
 from sim.twin import Twin
+from sim.worlds.factory import WorldFactory
+from sim.worlds.hidden import Measurement, measure, random_profile
 
 SETTING = Measurement(duration=20.0)
 

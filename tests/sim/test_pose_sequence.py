@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from gfimu.errors import InputError
-from sim.pose_sequence import POSE_SETS, PoseSequence
+from sim.motions.pose_sequence import POSE_SETS, PoseSequence
 from sim.scenarios import Scenario, simulate
 
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from gfimu.commands.campaign_worlds import measure_case
-from sim.campaign import Measurement
-from sim.factory import WorldFactory
 from sim.sweep.design import Case
 from sim.twin import Twin
+from sim.worlds.factory import WorldFactory
+from sim.worlds.hidden import Measurement
 
 SEED = 12345
 

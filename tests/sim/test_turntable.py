@@ -12,8 +12,8 @@ from gfimu.geometry.kinematics import specific_force
 from gfimu.units import STANDARD_GRAVITY
 from sim import forward
 from sim.effects import make_effect
-from sim.motion import SpinState
-from sim.profiles import Chirp, Hold, Ramp, Tumble, spin_profile
+from sim.motions.motion import SpinState
+from sim.motions.profiles import Chirp, Hold, Ramp, Tumble, spin_profile
 from sim.rigs.driven import drive
 from sim.rigs.rig_model import free_model, turntable_model
 from sim.rigs.turntable import prescribed_readings

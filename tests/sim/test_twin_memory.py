@@ -9,7 +9,7 @@ from numpy.testing import assert_array_equal
 from gfimu.geometry.array import AccelerometerArray
 from sim import forward
 from sim.effects import make_effect
-from sim.motion import SplineSpin
+from sim.motions.motion import SplineSpin
 from sim.twin import Twin
 
 T = np.linspace(0.0, 2.0, 40)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from firmware_bridge.adxl345.conversion import format_count
 from firmware_bridge.adxl345.device import Adxl345
 from firmware_bridge.adxl345.registers import RAW_PER_COUNT, TICKS_PER_SECOND, Adxl345Options
-from sim.adxl345 import quantise
+from sim.chips.adxl345 import quantise
 
 US = TICKS_PER_SECOND // 1_000_000
 MS = 1000 * US

@@ -18,7 +18,7 @@ from firmware_bridge.loop.virtual_run import record_virtual
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording.timing.conversion_times import conversion_times
 from gfimu.units import STANDARD_GRAVITY
-from sim.adxl345 import SensorErrors
+from sim.chips.adxl345 import SensorErrors
 
 LARGEST = 15.9 * STANDARD_GRAVITY
 CHIPS = [Adxl345Options(clock_error=error, phase=0.3) for error in (4e-3, -6e-3, 2e-3, -5e-4)]

@@ -11,10 +11,10 @@ from gfimu.geometry.kinematics import specific_force
 from gfimu.recording import Recording
 from gfimu.recording.carried_array import array_metadata
 from gfimu.units import STANDARD_GRAVITY
-from sim.adxl345 import Sensor, SensorSettings
+from sim.chips.adxl345 import Sensor, SensorSettings
 from sim.forward import leaning, rigid_readings, table_geometry
-from sim.pose_sequence import PoseSequence
-from sim.profiles import speed_sweep, spin_profile
+from sim.motions.pose_sequence import PoseSequence
+from sim.motions.profiles import speed_sweep, spin_profile
 from sim.world import Lean, World
 
 RATE = 100.0

@@ -15,7 +15,7 @@ from gfimu.calibration.multi_position import magnitude_condition, multi_position
 from gfimu.calibration.nonlinearity import quadratic_std, with_quadratic, without_quadratic
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
-from sim.adxl345 import SensorSettings
+from sim.chips.adxl345 import SensorSettings
 
 
 @pytest.fixture(scope="module")

@@ -16,7 +16,7 @@ from gfimu.calibration.spin.plateaus import find_plateaus
 from gfimu.certification.certify import certify
 from gfimu.errors import InputError, UnitError
 from gfimu.recording import Recording
-from sim.adxl345 import SensorErrors, SensorSettings
+from sim.chips.adxl345 import SensorErrors, SensorSettings
 from sim.scenarios import Scenario, simulate
 
 RATE = 100.0

@@ -18,7 +18,7 @@ from gfimu.recording import Recording
 from gfimu.recording.carried_array import array_metadata
 from gfimu.sensor_noise import flicker_noise
 from sim.forward import rigid_readings
-from sim.motion import SpinState
+from sim.motions.motion import SpinState
 from sim.world import World
 
 CUBE = AccelerometerArray.load("cube12")

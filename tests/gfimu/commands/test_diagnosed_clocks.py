@@ -11,8 +11,8 @@ import pytest
 import gfimu
 from gfimu.diagnosis.verdict.verdict import Diagnosis, Gain, NamedCause, Residual, Unexplained
 from gfimu.joining import ReferenceSeries
-from sim.campaign import Measurement, measure
 from sim.twin import Twin
+from sim.worlds.hidden import Measurement, measure
 
 TWIN = Twin.load("cube12_turntable")
 NOTHING = Diagnosis(

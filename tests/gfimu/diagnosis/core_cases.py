@@ -20,10 +20,10 @@ from gfimu.diagnosis.terms.columns import Columns
 from gfimu.diagnosis.terms.drive import Drive
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.world_model import Effect, Spin
-from sim.campaign import Measurement, measure
 from sim.effects import EFFECTS
-from sim.motion import SpinMotion, SplineSpin
+from sim.motions.motion import SpinMotion, SplineSpin
 from sim.twin import Twin
+from sim.worlds.hidden import Measurement, measure
 
 
 def small_twin(array: str = "p2_face_centres", rate: float = 50.0, **changes) -> Twin:

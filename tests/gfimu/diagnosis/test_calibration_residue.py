@@ -12,11 +12,11 @@ from gfimu.diagnosis.diagnose import prepare
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.nuisance_models import understand
 from gfimu.geometry.array import AccelerometerArray
-from sim.campaign import Measurement, measure
 from sim.effects import EFFECTS, make_effect
 from sim.study.cases import Case, study_cases
 from sim.study.outcome import draw_world
 from sim.twin import Twin
+from sim.worlds.hidden import Measurement, measure
 
 TWIN = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
 CORRECTED = {name for name, family in EFFECTS.items() if getattr(family, "tolerance", 0.0) > 0.0}

@@ -6,9 +6,9 @@ import pytest
 from gfimu.diagnosis import diagnose
 from gfimu.diagnosis.report.plain_words import headline
 from gfimu.geometry.array import AccelerometerArray
-from sim.campaign import Measurement, measure
 from sim.effects import make_effect
 from sim.twin import Twin
+from sim.worlds.hidden import Measurement, measure
 
 TWIN = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
 RUN = measure(

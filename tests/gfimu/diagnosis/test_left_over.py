@@ -18,9 +18,9 @@ from gfimu.diagnosis.policy import Policy
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
 from gfimu.units import STANDARD_GRAVITY
-from sim.campaign import Measurement, measure
 from sim.effects import make_effect
 from sim.twin import Twin
+from sim.worlds.hidden import Measurement, measure
 
 SETTING = Measurement(duration=24.0)
 CHANNEL = "a12"

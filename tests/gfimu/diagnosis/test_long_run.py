@@ -14,9 +14,9 @@ from gfimu.diagnosis.search import long_run
 from gfimu.diagnosis.search.long_run import spread_over_runs, understand_any_length
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
-from sim.campaign import Measurement, measure, random_profile
 from sim.effects import make_effect
 from sim.twin import Twin
+from sim.worlds.hidden import Measurement, measure, random_profile
 
 FEW = Policy(most_searched=2)
 

@@ -19,10 +19,10 @@ from gfimu.diagnosis.verdict.wording import verdict_sentences
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
-from sim.campaign import Measurement, measure, random_profile
 from sim.effects import make_effect
 from sim.study.cases import study_cases
 from sim.study.outcome import draw_world
+from sim.worlds.hidden import Measurement, measure, random_profile
 
 SETTING = Measurement(duration=24.0)
 

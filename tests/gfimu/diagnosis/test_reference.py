@@ -13,9 +13,9 @@ from gfimu.diagnosis.data.run import prepare_run
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
-from sim.campaign import Measurement, hidden_effect, measure, random_profile
 from sim.effects import EFFECTS, ENCODER_EFFECTS, NOT_OF_AN_ENCODER, Effect
 from sim.twin import Twin
+from sim.worlds.hidden import Measurement, hidden_effect, measure, random_profile
 
 SETTING = Measurement(duration=26.0)
 TURN = 2 * np.pi

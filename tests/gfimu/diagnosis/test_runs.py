@@ -19,10 +19,10 @@ from gfimu.diagnosis.policy import Policy
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
 from gfimu.units import STANDARD_GRAVITY
-from sim.campaign import Measurement, hidden_effect, measure, random_profile
 from sim.effects import make_effect
-from sim.profiles import Hold, Ramp, spin_profile
+from sim.motions.profiles import Hold, Ramp, spin_profile
 from sim.twin import Twin
+from sim.worlds.hidden import Measurement, hidden_effect, measure, random_profile
 
 SETTING = Measurement(duration=24.0)
 

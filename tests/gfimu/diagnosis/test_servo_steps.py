@@ -9,10 +9,10 @@ import pytest
 
 from gfimu.diagnosis import diagnose
 from gfimu.geometry.array import AccelerometerArray
-from sim.campaign import Measurement, measure
 from sim.effects import make_effect
-from sim.motion import SpinState, SplineSpin
+from sim.motions.motion import SpinState, SplineSpin
 from sim.twin import Twin
+from sim.worlds.hidden import Measurement, measure
 
 DURATION = 14.0
 

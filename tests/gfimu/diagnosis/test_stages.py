@@ -9,8 +9,8 @@ import pytest
 
 from gfimu.diagnosis import diagnose
 from gfimu.geometry.array import AccelerometerArray
-from sim.campaign import Measurement, measure
 from sim.twin import Twin
+from sim.worlds.hidden import Measurement, measure
 
 TWIN = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
 

@@ -12,9 +12,9 @@ from gfimu.diagnosis.report.plain_words import story
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
-from sim.campaign import Measurement, measure, random_profile
 from sim.effects import make_effect
 from sim.twin import Twin
+from sim.worlds.hidden import Measurement, measure, random_profile
 
 SETTING = Measurement(duration=24.0)
 CHANNEL = "a31"

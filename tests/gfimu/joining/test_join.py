@@ -9,8 +9,8 @@ from gfimu.geometry.array import AccelerometerArray
 from gfimu.joining import ReferenceSeries, join_reference, open_reference
 from gfimu.joining.signals import functions_of
 from gfimu.recording import Recording
-from sim.campaign import Measurement, measure
 from sim.twin import Twin
+from sim.worlds.hidden import Measurement, measure
 
 TWIN = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
 OFFSET, RATE_ERROR, LENGTH = 3.05, 0.0035, 40.0

@@ -9,10 +9,10 @@ import pytest
 
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.joining import displaced_reference
-from sim.campaign import Measurement, measure
 from sim.effects import make_effect
 from sim.scenarios import Scenario, simulate
 from sim.twin import Twin
+from sim.worlds.hidden import Measurement, measure
 
 TWIN = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
 

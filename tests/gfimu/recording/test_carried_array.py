@@ -14,7 +14,7 @@ from gfimu.parts.part import Part, white_noise_std
 from gfimu.rate.sensing import SensorErrors
 from gfimu.recording.carried_array import array_difference
 from gfimu.recording.formats import open_run
-from sim.data_sheet import DataSheet
+from sim.chips.data_sheet import DataSheet
 
 CUBE = AccelerometerArray.load("cube12")
 FORMATS = ("csv", "parquet")

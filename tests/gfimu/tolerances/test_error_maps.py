@@ -17,7 +17,7 @@ from gfimu.recording import Recording
 from gfimu.tolerances.budget import tolerance_budget
 from gfimu.tolerances.calibrated import remaining
 from gfimu.tolerances.propagation import error_maps, null_space_of
-from sim.toleranced import draw_unit, known_motion_of, reference_motion
+from sim.worlds.toleranced import draw_unit, known_motion_of, reference_motion
 
 ARRAYS = ("cube12", "p1_face_diagonals", "p2_face_centres", "p3_three_plus_one")
 """One of each form of the solution: linear; recursive, with ω² in p alone and in α; joint."""

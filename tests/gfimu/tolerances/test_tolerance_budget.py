@@ -20,7 +20,7 @@ from gfimu.tolerances.comparison import compare
 from gfimu.tolerances.propagation import error_maps
 from gfimu.tolerances.tolerances import CAUSES, ChipErrors, Tolerances
 from gfimu.tolerances.words import pay_for, room_for
-from sim.toleranced import known_motion_of, reference_motion
+from sim.worlds.toleranced import known_motion_of, reference_motion
 
 
 def usual(array, **changes):

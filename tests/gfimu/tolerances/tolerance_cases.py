@@ -12,10 +12,10 @@ from gfimu.motion.estimation import Estimate, estimate
 from gfimu.tolerances.calibrated import Poses
 from gfimu.tolerances.known_motion import KnownMotion
 from gfimu.tolerances.tolerances import ChipErrors, Tolerances
-from sim.adxl345 import SensorErrors
-from sim.pose_sequence import PoseSequence
+from sim.chips.adxl345 import SensorErrors
+from sim.motions.pose_sequence import PoseSequence
 from sim.scenarios import Scenario
-from sim.toleranced import ToleranceUnit, known_motion_of, reference_motion
+from sim.worlds.toleranced import ToleranceUnit, known_motion_of, reference_motion
 
 NOTHING = ChipErrors(0.0, 0.0, 0.0, 0.0, 0.0)
 """Chips without any error."""

@@ -16,9 +16,9 @@ from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.terms.cause import Cause
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
-from sim.campaign import Measurement, measure, random_profile
 from sim.effects import Effect
 from sim.twin import Twin
+from sim.worlds.hidden import Measurement, measure, random_profile
 
 Change = Callable[..., None]
 

@@ -17,10 +17,10 @@ from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.terms.cause import Cause
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
-from sim.campaign import Measurement, measure, random_profile
 from sim.effects import make_effect
-from sim.profiles import Hold, Ramp, spin_profile
+from sim.motions.profiles import Hold, Ramp, spin_profile
 from sim.twin import Twin
+from sim.worlds.hidden import Measurement, measure, random_profile
 
 POLICY = Policy()
 SETTING = Measurement(duration=32.0)

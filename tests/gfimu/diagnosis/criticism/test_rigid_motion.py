@@ -10,9 +10,9 @@ from gfimu.diagnosis.criticism.views.rigid_motion import motion_columns, rigid_m
 from gfimu.diagnosis.data.stretch import make_stretches
 from gfimu.diagnosis.diagnose import prepare
 from gfimu.geometry.array import AccelerometerArray
-from sim.campaign import Measurement, measure
 from sim.effects import make_effect
 from sim.twin import Twin
+from sim.worlds.hidden import Measurement, measure
 
 SETTING = Measurement(duration=30.0)
 

@@ -12,7 +12,7 @@ from gfimu.diagnosis.data.conversions import Conversions, settled
 from gfimu.diagnosis.data.run import Run, prepare_run, smooth_rate
 from gfimu.diagnosis.fit.learn import predicted_by_reference
 from gfimu.recording import Recording
-from sim.motion import SpinState
+from sim.motions.motion import SpinState
 from sim.twin import Twin
 
 TWIN = Twin.load("cube12_turntable")

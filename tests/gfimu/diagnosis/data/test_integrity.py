@@ -13,10 +13,10 @@ from gfimu.diagnosis.data.run import prepare_run
 from gfimu.diagnosis.data.samples import frozen_stretches
 from gfimu.diagnosis.diagnose import diagnose
 from gfimu.geometry.array import AccelerometerArray
-from sim.campaign import Measurement, measure
 from sim.effects import make_effect
-from sim.motion import SplineSpin
+from sim.motions.motion import SplineSpin
 from sim.twin import Twin
+from sim.worlds.hidden import Measurement, measure
 
 FASTEST = 20.0  # rad/s: the highest readings are centripetal
 SWAP_Z = ("axis_swap", {"channels": ["a13", "a21"]})

@@ -12,9 +12,9 @@ from gfimu.diagnosis.diagnose import diagnose, prepare
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.units import STANDARD_GRAVITY
-from sim.campaign import Measurement, hidden_effect, measure, random_profile
 from sim.effects import EFFECTS
 from sim.twin import Twin
+from sim.worlds.hidden import Measurement, hidden_effect, measure, random_profile
 
 TWIN = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
 SHORT = Measurement(duration=15.0)

@@ -9,8 +9,8 @@ import pytest
 from core_cases import lively, small_twin
 
 from gfimu.diagnosis.data.prepared_runs import PreparedRuns
-from sim.campaign import Measurement, measure
 from sim.effects import make_effect
+from sim.worlds.hidden import Measurement, measure
 
 TWIN = small_twin("cube12")
 

@@ -13,10 +13,10 @@ from gfimu.diagnosis.data.integrity import check_integrity
 from gfimu.diagnosis.data.run import prepare_run
 from gfimu.diagnosis.diagnose import diagnose
 from gfimu.geometry.array import AccelerometerArray, Chip
-from sim.campaign import Measurement, measure
 from sim.effects import make_effect
-from sim.motion import SplineSpin
+from sim.motions.motion import SplineSpin
 from sim.twin import Twin
+from sim.worlds.hidden import Measurement, measure
 
 STEP = 3.9e-3 * 9.80665  # m/s²
 TWIN = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")

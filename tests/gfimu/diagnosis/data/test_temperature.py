@@ -11,9 +11,9 @@ from numpy.testing import assert_array_equal
 from gfimu.diagnosis import diagnose
 from gfimu.diagnosis.data.rounding import between_steps
 from gfimu.geometry.array import AccelerometerArray
-from sim.campaign import Measurement, measure
 from sim.effects import make_effect
 from sim.twin import Twin
+from sim.worlds.hidden import Measurement, measure
 
 STEP = 1 / 16
 

@@ -14,8 +14,8 @@ from gfimu.diagnosis.diagnose import diagnose
 from gfimu.errors import RecordingWarning
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
-from sim.campaign import Measurement, measure
 from sim.twin import Twin
+from sim.worlds.hidden import Measurement, measure
 
 PERIOD = 0.01
 LATE = {

@@ -22,10 +22,10 @@ from gfimu.diagnosis.design.profile_search import plain_profile, profile_of, sta
 from gfimu.diagnosis.design.proposal import SEPARATED
 from gfimu.diagnosis.diagnose import diagnose
 from gfimu.errors import InputError
-from sim.campaign import Measurement, measure, random_profile
 from sim.effects import make_effect
 from sim.scenarios import Scenario
 from sim.twin import Twin
+from sim.worlds.hidden import Measurement, measure, random_profile
 
 LIMITS = Limits(rate=15.0, acceleration=20.0, duration=30.0)
 

@@ -20,7 +20,7 @@ from gfimu.diagnosis.search.explain import Sets, excess, explain, hardly_eases, 
 from gfimu.geometry.array import AccelerometerArray
 from sim.effects import EFFECTS
 from sim.effects.base import Effect, Size
-from sim.motion import SplineSpin
+from sim.motions.motion import SplineSpin
 from sim.twin import Twin
 
 TWIN = small_twin()

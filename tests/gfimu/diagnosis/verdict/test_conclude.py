@@ -16,7 +16,7 @@ from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.explain import explain
 from gfimu.diagnosis.search.nuisance_models import Understanding
 from gfimu.diagnosis.verdict.conclude import conclude, is_dominant, is_unknown, named_causes
-from sim.campaign import Measurement, measure
+from sim.worlds.hidden import Measurement, measure
 
 TWIN = small_twin()
 HIDDEN = cause_of("table_tilt", TWIN.array, [1.0, -0.5])

@@ -11,9 +11,9 @@ from gfimu.diagnosis.diagnose import diagnose, prepare
 from gfimu.diagnosis.fit.learn import predicted_by_reference
 from gfimu.diagnosis.verdict.likely_mistakes import likely_mistake
 from gfimu.geometry.array import AccelerometerArray
-from sim.campaign import Measurement, measure
 from sim.effects import make_effect
 from sim.twin import Twin
+from sim.worlds.hidden import Measurement, measure
 
 CUBE = AccelerometerArray.load("cube12")
 TWIN = Twin(array=CUBE, array_name="cube12")

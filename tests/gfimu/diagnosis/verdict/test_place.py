@@ -14,8 +14,8 @@ from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.report.page import report_html
 from gfimu.diagnosis.verdict.place import with_place
 from gfimu.geometry.array import AccelerometerArray
-from sim.campaign import Measurement, measure
 from sim.twin import Twin
+from sim.worlds.hidden import Measurement, measure
 
 TWIN = having(
     Twin(array=AccelerometerArray.load("cube12"), array_name="cube12"), "eccentricity", "scale_factor", "table_tilt"

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from gfimu.errors import InputError, unknown_name
-from sim.motion import BodyState
+from sim.motions.motion import BodyState
 
 __all__ = ["POSE_SETS", "PoseSequence"]
 

@@ -9,10 +9,10 @@ from __future__ import annotations
 from typing import Annotated, Literal
 
 from gfimu.files.schema import NotNegative, Positive, Table, Triple, about
-from sim.carried import Carriage, Hand, Wheel
-from sim.motion import BodyMotion, SpinMotion
-from sim.pose_sequence import PoseSequence
-from sim.profiles import Chirp, Hold, Ramp, Segment, Sine, Tumble, spin_profile
+from sim.motions.carried import Carriage, Hand, Wheel
+from sim.motions.motion import BodyMotion, SpinMotion
+from sim.motions.pose_sequence import PoseSequence
+from sim.motions.profiles import Chirp, Hold, Ramp, Segment, Sine, Tumble, spin_profile
 
 __all__ = [
     "CarriageTable",

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.geometry.array import AccelerometerArray
-from sim.adxl345 import SensorSettings, conversion_offsets
-from sim.data_sheet import DataSheet
+from sim.chips.adxl345 import SensorSettings, conversion_offsets
+from sim.chips.data_sheet import DataSheet
 
 __all__ = ["conversion_groups"]
 

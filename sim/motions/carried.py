@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from gfimu import world_model
 from gfimu.errors import InputError
-from sim.motion import BodyState, SpinMotion
+from sim.motions.motion import BodyState, SpinMotion
 
 __all__ = ["Carriage", "Hand", "Wheel"]
 

@@ -19,7 +19,7 @@ from scipy.spatial.transform import Rotation
 from scipy.special import ellipj, ellipk
 
 from gfimu.errors import InputError
-from sim.motion import BodyState, SplineSpin
+from sim.motions.motion import BodyState, SplineSpin
 
 __all__ = ["Chirp", "Hold", "Ramp", "Segment", "Sine", "Tumble", "paper_run", "speed_sweep", "spin_profile"]
 

@@ -19,9 +19,9 @@ from gfimu.recording.carried_array import array_metadata
 from gfimu.short_repr import short_repr
 from gfimu.tolerances.known_motion import KnownMotion
 from gfimu.tolerances.tolerances import Tolerances
-from sim.adxl345 import SensorErrors
-from sim.motion import BodyState
-from sim.profiles import Hold, Ramp, Segment, spin_profile
+from sim.chips.adxl345 import SensorErrors
+from sim.motions.motion import BodyState
+from sim.motions.profiles import Hold, Ramp, Segment, spin_profile
 from sim.rigs.turntable import prescribed_readings
 from sim.scenarios import Scenario
 from sim.truth import cube_state

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray, Chip
 from gfimu.short_repr import short_repr
-from sim.data_sheet import DataSheet
+from sim.chips.data_sheet import DataSheet
 
 __all__ = ["Sensor", "SensorErrors", "SensorSettings", "conversion_offsets", "draw_errors", "flicker", "quantise"]
 

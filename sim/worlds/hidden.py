@@ -18,7 +18,7 @@ from gfimu.recording import Recording
 from gfimu.units import MILLI_G
 from sim import forward
 from sim.effects import EFFECTS, Effect, make_effect
-from sim.motion import SpinMotion, SplineSpin
+from sim.motions.motion import SpinMotion, SplineSpin
 from sim.twin import Twin
 
 __all__ = [

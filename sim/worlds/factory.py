@@ -1,4 +1,4 @@
-"""A factory of measured worlds: `sim.campaign.measure`, many times faster and equal in distribution.
+"""A factory of measured worlds: `sim.worlds.hidden.measure`, many times faster and equal in distribution.
 
 Campaigns draw millions of recordings of one twin. What they share is made once (times, geometry, noise filters), the
 noise of a channel is one process driven by one number per sample (`gfimu.sensor_noise.innovations`), and the
@@ -22,11 +22,19 @@ from gfimu.recording import Recording
 from gfimu.recording.carried_array import array_metadata
 from gfimu.sensor_noise.innovations import FlickerShape, add_noise, flicker_shape
 from sim import forward
-from sim.campaign import GRID, SMOOTHING, Measurement, drawn_profile, level_factors, profile_grid, temperature_course
 from sim.effects import Effect
-from sim.motion import SpinMotion, SpinState, SplineSpin
+from sim.motions.motion import SpinMotion, SpinState, SplineSpin
 from sim.twin import Twin
 from sim.world import World
+from sim.worlds.hidden import (
+    GRID,
+    SMOOTHING,
+    Measurement,
+    drawn_profile,
+    level_factors,
+    profile_grid,
+    temperature_course,
+)
 
 __all__ = ["MeasuredWorld", "WorldFactory"]
 
@@ -82,7 +90,7 @@ class WorldFactory:
 
     def __post_init__(self) -> None:
         if self.setting.encoder_step:
-            raise InputError("the factory makes no encoder readings; use sim.campaign.measure")
+            raise InputError("the factory makes no encoder readings; use sim.worlds.hidden.measure")
 
     def measure(self, rng: np.random.Generator, effects: Sequence[Effect] = ()) -> Recording:
         """Record a world: the twin's, plus effects, on a random profile.
@@ -97,7 +105,7 @@ class WorldFactory:
         Returns
         -------
         Recording
-            As that of `sim.campaign.measure`, of the same distribution.
+            As that of `sim.worlds.hidden.measure`, of the same distribution.
         """
         return self.world(rng, effects).recording
 
