@@ -1,4 +1,4 @@
-"""Sphinx configuration of the documentation: ``sphinx-build -W --keep-going docs docs/_build``."""
+"""Sphinx configuration of the documentation: ``sphinx-build -W --keep-going docs docs/_build/html``."""
 
 import sys
 from pathlib import Path
@@ -28,7 +28,7 @@ extensions = [
     "sphinx_copybutton",
     "sphinx_design",
 ]
-exclude_patterns = ["_build", "scripts", "examples", "paper", "**.ipynb_checkpoints"]
+exclude_patterns = ["_build", "scripts", "examples", "**.ipynb_checkpoints"]
 
 # Markdown: anchors of headings as on GitHub, so that a page can be read there and here.
 myst_enable_extensions = ["dollarmath", "colon_fence", "deflist", "attrs_inline"]
