@@ -1,4 +1,4 @@
-"""Sphinx configuration of the documentation: ``sphinx-build -W --keep-going docs docs/_build``."""
+"""Sphinx configuration of the documentation: ``sphinx-build -W --keep-going docs docs/_build/html``."""
 
 import sys
 from pathlib import Path
@@ -33,7 +33,6 @@ exclude_patterns = ["_build", "scripts", "examples", "paper", "**.ipynb_checkpoi
 # Markdown: anchors of headings as on GitHub, so that a page can be read there and here.
 myst_enable_extensions = ["dollarmath", "colon_fence", "deflist", "attrs_inline"]
 myst_heading_anchors = 4
-myst_title_to_header = True  # of the paper, whose title stands in its front matter
 myst_dmath_double_inline = True
 nb_execution_mode = "off"  # tests execute the notebooks
 

@@ -8,7 +8,7 @@ import typer
 
 import gfimu
 
-APART = {"_build", "api", "cli", "paper"}  # folders that Sphinx writes, and an article
+APART = {"_build", "api", "cli"}  # folders that Sphinx writes
 
 
 def toctree(page):
