@@ -1,4 +1,4 @@
-"""What other packages add to gfimu: entry points, found by the name of their group.
+"""What users add to gfimu: entry points of packages, found by the name of their group, and functions in files.
 
 A package declares them in its ``pyproject.toml``, such as ::
 
@@ -12,14 +12,19 @@ return a `gfimu.world_model.WorldModel`), ``gfimu.estimators`` (`gfimu.rate.regi
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import importlib.util
+import sys
+from collections.abc import Callable, Iterable
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
-from typing import TypeVar
+from pathlib import Path
+from types import ModuleType
+from typing import Any, TypeVar
 
-from gfimu.errors import InputError
+from gfimu.errors import InputError, unknown_name
+from gfimu.files.input_file import is_ordinary
 
-__all__ = ["GROUPS", "plugins"]
+__all__ = ["GROUPS", "function_of_file", "plugins"]
 
 GROUPS = ("gfimu.effects", "gfimu.twins", "gfimu.estimators", "gfimu.readers", "gfimu.formats")
 """Groups of entry points that gfimu looks for."""
@@ -72,3 +77,48 @@ def _load(point: EntryPoint) -> object:
         return point.load()
     except Exception as error:  # noqa: BLE001 - whatever a foreign module may raise
         return error
+
+
+def function_of_file(source: str, what: str) -> Callable[..., Any]:
+    """Return a function of a Python file.
+
+    The file is run as Python runs it: it can import the files beside it. Each call runs it again.
+
+    Parameters
+    ----------
+    source : str
+        ``FILE.py:FUNCTION``.
+    what : str
+        What the function is, for messages.
+
+    Raises
+    ------
+    InputError
+        If there is no such file or function, or the file raises an exception.
+    """
+    file, _, name = source.rpartition(":")
+    if not file.endswith(".py") or not is_ordinary(file):
+        raise InputError(f"{file or source}: no such file; give {what} as FILE.py:FUNCTION")
+    module = _run(Path(file))
+    function = getattr(module, name, None)
+    if not callable(function):
+        own = [one for one, thing in vars(module).items() if getattr(thing, "__module__", "") == module.__name__]
+        raise unknown_name(f"function of {file}", name, [one for one in own if callable(vars(module)[one])])
+    return function  # type: ignore[no-any-return]
+
+
+def _run(file: Path) -> ModuleType:
+    name = f"gfimu_user_{file.stem}"
+    spec = importlib.util.spec_from_file_location(name, file)
+    if spec is None or spec.loader is None:
+        raise InputError(f"{file}: not a Python file")
+    module = importlib.util.module_from_spec(spec)
+    folder = str(file.resolve().parent)
+    if folder not in sys.path:
+        sys.path.append(folder)  # at the end: a file of the user hides no installed package
+    sys.modules[name] = module  # as dataclasses in it need
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:  # whatever the file may raise
+        raise InputError(f"{file}: {type(error).__name__}: {error}; run it with python to see where") from error
+    return module

@@ -123,7 +123,7 @@ class Board:
         self.gpio.on_change = self._pins_changed
         self.chip_pins = ChipPins(self, self.sensors, self.gpio.drive)
         self.watchdog = Watchdog(self, "watchdog", 0x40000000, irq=0)
-        self.cycle_counter = CycleCounter(self, "dwt", 0xE0001000)
+        CycleCounter(self, "dwt", 0xE0001000)
         PinConnect(self, "pincon", 0x4002C000)
         self.adc = Adc(self)
         self.rtc = Rtc(self)

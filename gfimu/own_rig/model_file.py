@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from types import FunctionType, ModuleType
+from types import FunctionType
 
 from gfimu.errors import InputError, unknown_name
 from gfimu.files.input_file import is_ordinary
 from gfimu.files.model_files import read_toml
 from gfimu.own_rig.cause import UnnamedCause
 from gfimu.own_rig.simulator import SimulatorModel
-from gfimu.plugins import plugins
+from gfimu.plugins import function_of_file, plugins
 from gfimu.world_model import Effect, WorldModel
 
 __all__ = ["load_model"]
@@ -38,9 +36,8 @@ def load_model(name: str | Path) -> WorldModel | None:
         If the file, the function or the model in it can't be used; the file is run as Python runs it.
     """
     text = str(name)
-    file, colon, function = text.rpartition(":")
-    if colon and file.endswith(".py"):
-        return _with_source(_made(_function_of(_module(Path(file)), function, file), text), text)
+    if text.rpartition(":")[0].endswith(".py"):
+        return _with_source(_made(function_of_file(text, "a twin of one's own"), text), text)
     installed = plugins(GROUP, FunctionType)
     if text in installed:
         return _with_source(_made(installed[text], text), text)
@@ -70,31 +67,6 @@ def _of_file(path: Path) -> WorldModel | None:
             raise unknown_name(f"effect in {path}:", found, families)
         effects.append(families[found](entry.get("parameters", {})))
     return model.extended(effects)
-
-
-def _module(file: Path) -> ModuleType:
-    if not is_ordinary(file):
-        raise InputError(f"{file}: no such file; give a Python file and a function in it: rig.py:twin")
-    name = f"gfimu_own_rig_{file.stem}"
-    spec = importlib.util.spec_from_file_location(name, file)
-    if spec is None or spec.loader is None:
-        raise InputError(f"{file}: not a Python file")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module  # as dataclasses in it need
-    try:
-        spec.loader.exec_module(module)
-    except Exception as error:  # whatever the file may raise
-        raise InputError(f"{file}: {type(error).__name__}: {error}; run it with python to see where") from error
-    return module
-
-
-def _function_of(module: ModuleType, name: str, file: str) -> Callable[[], object]:
-    """Return a function of a module; raises `InputError` with those that it has."""
-    function = getattr(module, name, None)
-    if not callable(function):
-        own = [one for one, thing in vars(module).items() if getattr(thing, "__module__", "") == module.__name__]
-        raise unknown_name(f"function of {file}", name, [one for one in own if callable(vars(module)[one])])
-    return function  # type: ignore[no-any-return]
 
 
 def _made(function: Callable[[], object], source: str) -> WorldModel:

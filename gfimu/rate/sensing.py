@@ -199,11 +199,10 @@ class ChannelTables:
         self._variance = errors.noise_std**2
         self._length_scale = np.array([array.length_unit] * 3 + [1.0] * 3)
         c = array.n_channels
-        basis, strengths = self._whitened_null_space()
+        basis = self._whitened_null_space()
         self.n_null = len(basis)
         self._basis = basis
         self._base_alpha = self._alpha_rows(np.ones(c, dtype=bool), basis)
-        self.seen_products = int(np.sum(strengths > _RANK_TOLERANCE * max(1.0, strengths.max(initial=0.0))))
         d = self.n_null
         self.masks = np.zeros(0, dtype=np.int64)
         self.alpha_rows = np.zeros((0, 3, c))
@@ -257,15 +256,15 @@ class ChannelTables:
         rows = np.vstack([self._base_alpha, self._basis])
         return rows * bias_std**2 @ rows.T
 
-    def _whitened_null_space(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Rows Z with Z J = 0 and unit noise, those that see ω best first, and their strengths."""
+    def _whitened_null_space(self) -> NDArray[np.float64]:
+        """Rows Z with Z J = 0 and unit noise, those that see ω best first."""
         basis = null_rows((self.array.regression_matrix / self._length_scale).T)  # (c - 6, c)
         if len(basis) == 0:
-            return basis, np.zeros(0)
+            return basis
         cholesky = np.linalg.cholesky(basis * self._variance @ basis.T)
         white = np.linalg.solve(cholesky, basis)
-        rotation, strengths, _ = np.linalg.svd(white @ self.array.centripetal_matrix)
-        return rotation.T @ white, strengths
+        rotation, _, _ = np.linalg.svd(white @ self.array.centripetal_matrix)
+        return rotation.T @ white
 
     def _alpha_rows(self, present: NDArray[np.bool_], null_rows: NDArray[np.float64]) -> NDArray[np.float64]:
         """Rows A of the working channels: unweighted left inverse, cleaned of ω² by well-seen products."""

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import importlib
-import importlib.util
 import os
-import sys
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import msgspec
 
 from gfimu.errors import InputError
+from gfimu.plugins import function_of_file
 from sim.benchmark.answer import Answer, answer_of
 from sim.benchmark.real import real_task
 from sim.benchmark.release import MEASURED, RELEASE, cases, find_case
@@ -41,39 +38,15 @@ def load_method(reference: str) -> Method:
     Raises
     ------
     InputError
-        If the file, module or function is not there; a file is run as Python runs it.
+        If the file, module or function is not there, or the file raises an exception.
     """
-    place, colon, function = reference.rpartition(":")
-    if not colon:
-        raise InputError(f"{reference}: give a method as FILE.py:function, or one of {', '.join(BASELINES)}")
-    module = _file(Path(place)) if place.endswith(".py") else _module(place)
-    found = getattr(module, function, None)
-    if not callable(found):
-        raise InputError(f"{reference}: {place} has no function {function!r}")
-    return found  # type: ignore[no-any-return]
-
-
-def _file(path: Path) -> ModuleType:
-    if not path.is_file():
-        raise InputError(f"{path}: no such file; give a method as FILE.py:function")
-    name = f"gfimu_benchmark_{path.stem}"
-    spec = importlib.util.spec_from_file_location(name, path)
-    if spec is None or spec.loader is None:
-        raise InputError(f"{path}: not a Python file")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module  # as dataclasses in it need
+    place, _, function = reference.rpartition(":")
+    if place.endswith(".py"):
+        return function_of_file(reference, "a method")
     try:
-        spec.loader.exec_module(module)
-    except Exception as error:  # whatever the file may raise
-        raise InputError(f"{path}: {type(error).__name__}: {error}; run it with python to see where") from error
-    return module
-
-
-def _module(name: str) -> ModuleType:
-    try:
-        return importlib.import_module(name)
-    except ImportError as error:
-        raise InputError(f"{name}: {error}; give a method as FILE.py:function") from None
+        return getattr(importlib.import_module(place), function)  # type: ignore[no-any-return]
+    except (ImportError, AttributeError, ValueError) as error:  # ValueError: no module is named
+        raise InputError(f"{reference}: {error}; give a method as FILE.py:FUNCTION") from None
 
 
 def benchmark_plan(

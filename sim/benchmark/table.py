@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -170,12 +170,3 @@ def markdown(found: Sequence[Summary]) -> str:
     """Return summaries as a table in Markdown."""
     rows = [COLUMNS, tuple("---" for _ in COLUMNS), *(one.row() for one in found)]
     return "\n".join(f"| {' | '.join(row)} |" for row in rows) + "\n"
-
-
-def confusion(judged: Iterable[Judged]) -> Mapping[tuple[str, str], int]:
-    """Return how often each hidden name was answered by what, wrong answers only."""
-    return Counter(
-        (" + ".join(one.hidden) or "nothing", " + ".join(one.said))
-        for one in judged
-        if one.outcome in {"wrong", "false_alarm"}
-    )

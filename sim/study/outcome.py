@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import importlib
 import os
-import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,8 +14,8 @@ from gfimu.diagnosis.design.distinguishability import energy_left, normal_equati
 from gfimu.diagnosis.design.planned_run import PlannedRun, planned
 from gfimu.diagnosis.verdict.library import standing_out
 from gfimu.diagnosis.verdict.verdict import Diagnosis, NamedCause
-from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
+from gfimu.plugins import function_of_file
 from gfimu.recording import Recording
 from gfimu.short_repr import short_repr
 from gfimu.units import MILLI_G
@@ -29,7 +26,7 @@ from sim.study.cases import Case
 from sim.twin import Twin
 from sim.worlds.hidden import Measurement, detectability, hidden_effect, measure, random_profile
 
-__all__ = ["HiddenWorld", "SmallerLibrary", "draw_world", "load_generator", "outcome_of", "run_case"]
+__all__ = ["HiddenWorld", "SmallerLibrary", "draw_world", "outcome_of", "run_case"]
 
 _TURN = 2 * np.pi
 _SHAPES = frozenset(("frequency_hz", "damping_ratio", "order", "width_m_s2", "time_constant_s"))
@@ -181,7 +178,7 @@ def _reaches(twin: Twin, motion: SpinMotion, setting: Measurement, level: float)
 
 
 def _foreign_world(case: Case, twin: Twin, source: str) -> HiddenWorld:
-    run = load_generator(source)(
+    run = function_of_file(source, "a generator")(
         case.seed,
         case.effects,
         case.size,
@@ -194,21 +191,6 @@ def _foreign_world(case: Case, twin: Twin, source: str) -> HiddenWorld:
     readings = np.column_stack([columns.pop(f"{channel}_m_s2") for channel in twin.array.channels])
     recording = Recording.from_arrays(columns.pop("t_s"), readings, twin.array, reference=columns)
     return HiddenWorld(recording, twin, tuple(run.truth), run.detectability)
-
-
-def load_generator(source: str) -> Callable[..., Any]:
-    """Return a generator of worlds, given as ``FILE.py:FUNCTION``; raises `InputError` if there is none."""
-    file, _, function = source.rpartition(":")
-    path = Path(file)
-    if not path.is_file():
-        raise InputError(f"{source}: give the generator as FILE.py:FUNCTION with an existing file")
-    folder = str(path.resolve().parent)
-    if folder not in sys.path:
-        sys.path.insert(0, folder)
-    found: Callable[..., Any] | None = getattr(importlib.import_module(path.stem), function, None)
-    if found is None:
-        raise InputError(f"{source}: {file} has no function {function!r}")
-    return found
 
 
 def run_case(case: Case, source: str = "") -> dict[str, Any]:

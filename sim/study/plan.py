@@ -14,11 +14,12 @@ import msgspec
 import numpy as np
 
 from gfimu.errors import InputError
+from gfimu.plugins import function_of_file
 from sim.study.baselines import run_baseline
 from sim.study.blame import blame_of, is_miss
 from sim.study.cases import find_case, study_cases
 from sim.study.gate import GATE, gate_cases
-from sim.study.outcome import load_generator, run_case
+from sim.study.outcome import run_case
 from sim.study.report import brief
 from sim.sweep.design import Case
 from sim.sweep.plan import PlanFile
@@ -56,7 +57,7 @@ def study_plan(
         cases = gate_cases(first) if study == GATE else [(case, source) for case in study_cases(study, first)]
         worlds |= {f"{case.key} {own}".strip(): None for case, own in cases}
     for generator in {world.partition(" ")[2] for world in worlds} - {""}:
-        load_generator(generator)
+        function_of_file(generator, "a generator")
     return PlanFile({"world": list(worlds), "method": [method], "blame": [blame]}, kind="study", batch=1)
 
 

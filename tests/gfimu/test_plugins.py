@@ -9,7 +9,7 @@ import gfimu
 from gfimu import plugins as loading
 from gfimu.errors import InputError
 from gfimu.importing.readers import read_foreign, readers
-from gfimu.plugins import GROUPS, plugins
+from gfimu.plugins import GROUPS, function_of_file, plugins
 from gfimu.rate.registry import RateMethod, rate_method
 from gfimu.recording.formats import formats
 from sim.effects import added_effects, make_effect
@@ -165,3 +165,30 @@ def test_a_package_that_is_wrong_is_named(tmp_path, monkeypatch, points, message
         added_effects()
     loading._loaded.cache_clear()
     sys.modules.pop("stranger_rig", None)
+
+
+def test_a_function_of_a_file_sees_the_files_beside_it_and_installed_packages_first(tmp_path, monkeypatch):
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    (tmp_path / "beside_of_a_rig.py").write_text("LENGTH = 0.2\n")
+    (tmp_path / "msgspec.py").write_text("raise RuntimeError\n")
+    file = tmp_path / "rig.py"
+    file.write_text("import msgspec\nfrom beside_of_a_rig import LENGTH\n\ndef length():\n    return LENGTH\n")
+    monkeypatch.delitem(sys.modules, "msgspec")
+    assert function_of_file(f"{file}:length", "a length")() == 0.2
+
+
+@pytest.mark.parametrize(
+    ("source", "words"),
+    [
+        ("none.py:length", r"none\.py: no such file; give a length as FILE\.py:FUNCTION"),
+        ("length", r"length: no such file; give a length as FILE\.py:FUNCTION"),
+        ("{rig}:lengths", r"unknown function of .*rig\.py 'lengths'; valid: length; did you mean 'length'\?"),
+        ("{wrong}:length", r"wrong\.py: ZeroDivisionError: division by zero; run it with python to see where"),
+    ],
+)
+def test_a_function_that_is_not_in_a_file_is_one_line(tmp_path, source, words):
+    places = {"rig": tmp_path / "rig.py", "wrong": tmp_path / "wrong.py"}
+    places["rig"].write_text("def length():\n    return 0.2\n")
+    places["wrong"].write_text("1 / 0\n")
+    with pytest.raises(InputError, match=words):
+        function_of_file(source.format(**places), "a length")

@@ -39,11 +39,6 @@ class NoiseLevels:
     flicker: NDArray[np.float64]
     walk: float = 0.0
 
-    @property
-    def of_reading(self) -> float:
-        """White noise of a usual reading, m/s²."""
-        return float(np.median(self.white[:-1]))
-
 
 class CosineBasis:
     """Lowest cosines of a stretch of a run and the spectrum of bias instability and of a random walk on them.

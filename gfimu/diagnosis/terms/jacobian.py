@@ -105,14 +105,6 @@ class Jacobian:
             out[at, at] += mixed.T @ mixed
         return out
 
-    def covariance_share(self, covariance: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return w_c tr(J_c S J_cᵀ) of each observation for a covariance S (m, m) of the coefficients, shape (c,)."""
-        inner = np.zeros((len(self.loading),) * 2)
-        for _, at, block in self.blocks:
-            moved = block @ covariance[at, at]
-            inner += np.einsum("rij,sij->rs", moved, block)
-        return np.asarray(weights * np.einsum("rc,rs,sc->c", self.loading, inner, self.loading))
-
 
 def differentiate(
     predict: Predict,

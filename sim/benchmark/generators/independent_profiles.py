@@ -3,8 +3,6 @@
 The table follows them exactly, unless what is hidden is in its drive or its mounting: MuJoCo's table has a mode.
 """
 
-from functools import partial
-
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d
@@ -98,8 +96,3 @@ def follow(command, rig, duration, step=1e-3):
 def hide(seed, effects=(), size=300.0, **setting):
     """Hide effects in a run as `independent_world.hide` does, under a programmed command."""
     return hide_in(seed, effects, size, draw_command=programmed_command, drive=follow, **setting)
-
-
-def hide_rocked(seed, effects=(), size=300.0, **setting):
-    """Hide effects in a run that is rocked, on MuJoCo's table: its friction changes sides at the same angles."""
-    return hide_in(seed, effects, size, draw_command=partial(programmed_command, name="rocking"), **setting)

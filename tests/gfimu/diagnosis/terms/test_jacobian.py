@@ -200,7 +200,3 @@ def test_products_equal_dense_ones(random_jacobian):
     assert_allclose(found.correlate(combined), np.einsum("nci,ncp->ip", dense, values), atol=1e-4)
     back = np.tensordot(found.loading.T, found.transposed(values[:, 0]), axes=1)  # (c, m, P)
     assert_allclose(back, np.einsum("nci,np->cip", dense, values[:, 0]), atol=1e-4)
-    root = rng.standard_normal((found.size, found.size))
-    covariance = root @ root.T
-    share = np.einsum("c,nci,ij,ncj->c", weights, dense, covariance, dense)
-    assert_allclose(found.covariance_share(covariance, weights), share, rtol=1e-5)
