@@ -13,6 +13,7 @@ from test_docs_words import VAGUE
 from gfimu.diagnosis.design.proposal import SEPARATED
 from gfimu.diagnosis.policy import Policy
 from gfimu.errors import InputError
+from gfimu.files.model_files import effect_catalogue
 from sim.effects import (
     BODY_EFFECTS,
     CARRIAGE_EFFECTS,
@@ -23,7 +24,7 @@ from sim.effects import (
     Size,
     catalogue,
 )
-from sim.effects.catalogue import PLACES, essence, every_effect, place_of, stored_numbers
+from sim.effects.catalogue import PLACES, essence, every_effect, place_of
 from sim.effects.description import describe
 from sim.scenarios import Scenario
 
@@ -48,12 +49,12 @@ def folder(project_root):
 def test_every_registered_effect_is_in_the_catalogue():
     known = TABLE_EFFECTS | BODY_EFFECTS | CARRIAGE_EFFECTS | INCLINED_EFFECTS | SIMULATED_EFFECTS
     assert set(EFFECTS) == {*known, "unknown"}
-    assert set(stored_numbers()) == set(EFFECTS), "run: python docs/scripts/make_effect_catalogue.py --compute"
+    assert set(effect_catalogue()) == set(EFFECTS), "run: python docs/scripts/make_effect_catalogue.py --compute"
     assert {place_of(effect) for effect in EFFECTS.values()} == set(PLACES)
 
 
 def test_the_pages_are_those_of_the_code(script, folder):
-    made = script("make_effect_catalogue").pages(stored_numbers(), EFFECTS)
+    made = script("make_effect_catalogue").pages(effect_catalogue(), EFFECTS)
     stored = {file.name: file.read_text(encoding="utf-8") for file in folder.glob("*.md")}
     assert set(stored) == set(made)
     assert [name for name in made if stored[name] != made[name]] == [], (
@@ -100,7 +101,7 @@ def test_the_command_of_a_page_hides_the_effect(script, name):
 @pytest.mark.parametrize("name", EFFECTS)
 def test_the_signature_is_the_one_that_is_stored(script, name):
     found = script("effect_signatures").signature(name, describe(EFFECTS[name]).example).numbers()
-    stored = stored_numbers()[name]["signature"]
+    stored = effect_catalogue()[name]["signature"]
     assert {key: found[key] for key in ("scenario", "drawn", "unit", "against")} == {
         key: stored[key] for key in ("scenario", "drawn", "unit", "against")
     }
@@ -114,7 +115,7 @@ def test_the_rivals_in_a_constant_spin_are_those_that_are_stored(script):
     table = rivals.table_of(rivals.TABLE.twin, rivals.TABLE.motions["constant spin"])
     assert len(table.names) > 45
     for name in table.names:
-        found, stored = table.of(name), stored_numbers()[name]["motions"]["constant spin"]
+        found, stored = table.of(name), effect_catalogue()[name]["motions"]["constant spin"]
         assert found["detectability"] == pytest.approx(stored["detectability"], rel=0.01, abs=0.01)
         for rival, share, _ in stored["rivals"]:
             assert found["rivals"][rival][0] == pytest.approx(share, abs=0.003), (name, rival)
@@ -122,7 +123,7 @@ def test_the_rivals_in_a_constant_spin_are_those_that_are_stored(script):
 
 def test_the_rivals_are_those_that_are_stored(script):
     found = script("effect_numbers").rivalry(EFFECTS)
-    for name, stored in stored_numbers().items():
+    for name, stored in effect_catalogue().items():
         assert set(found[name]["motions"]) == set(stored["motions"]), name
         for motion, one in stored["motions"].items():
             again = found[name]["motions"][motion]

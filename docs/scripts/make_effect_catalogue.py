@@ -24,14 +24,15 @@ from effect_pages import page
 from effect_signatures import draw, signature
 from effect_trials import trial
 
+from gfimu.files.model_files import EFFECT_CATALOGUE, effect_catalogue
 from sim.effects import added_effects
 from sim.effects.base import Effect
-from sim.effects.catalogue import STORE, every_effect, stored_numbers
+from sim.effects.catalogue import every_effect
 from sim.effects.description import describe
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = ROOT / "docs" / "effects"
-NUMBERS = ROOT / "models" / STORE
+NUMBERS = ROOT / "models" / EFFECT_CATALOGUE
 
 
 def pages(numbers: Mapping[str, Any], effects: Mapping[str, type[Effect]]) -> dict[str, str]:
@@ -69,7 +70,7 @@ def main(arguments: list[str] | None = None) -> None:
     own = given.out is None
     effects = every_effect() if own else added_effects()
     folder, store = (PAGES, NUMBERS) if own else (given.out, given.out / "catalogue.json")
-    numbers = dict(stored_numbers()) if own else json.loads(store.read_text("utf-8")) if store.exists() else {}
+    numbers = dict(effect_catalogue()) if own else json.loads(store.read_text("utf-8")) if store.exists() else {}
     chosen = {name: one for name, one in effects.items() if given.effect in (None, name)}
     if given.compute:
         compute(chosen, numbers, folder / "figures")

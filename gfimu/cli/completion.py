@@ -25,6 +25,8 @@ __all__ = [
 
 Values = list[tuple[str, str]]
 
+_UNKNOWN = "unknown"  # stands in the catalogue for what no effect explains; no run can be designed for it
+
 
 @dataclass(frozen=True)
 class Offer:
@@ -76,9 +78,7 @@ def frames(incomplete: str) -> Values:
 
 def effects(incomplete: str) -> Values:
     """Offer the effects of the library; those of other packages are not offered, as this would load them."""
-    from gfimu.cli.effect_names import EFFECT_NAMES
-
-    return _beginning(incomplete, EFFECT_NAMES)
+    return [one for one in _catalogued(incomplete) if one[0] != _UNKNOWN]
 
 
 def objectives(incomplete: str) -> Values:
@@ -91,7 +91,7 @@ def objectives(incomplete: str) -> Values:
 def shown(incomplete: str) -> Values:
     """Offer all that `gfimu show` prints by name."""
     kinds = ("arrays", "parts", "maps", "twins", "scenarios", "frames")
-    return [*(one for kind in kinds for one in _models(kind, incomplete)), *effects(incomplete)]
+    return [*(one for kind in kinds for one in _models(kind, incomplete)), *_catalogued(incomplete)]
 
 
 def commands(incomplete: str) -> Values:
@@ -99,6 +99,12 @@ def commands(incomplete: str) -> Values:
     from gfimu.commands.schema import schema_names
 
     return _beginning(incomplete, dict.fromkeys(name.partition(" ")[0] for name in schema_names()))
+
+
+def _catalogued(incomplete: str) -> Values:
+    from gfimu.files.model_files import effect_catalogue
+
+    return _beginning(incomplete, effect_catalogue())
 
 
 def _models(kind: str, incomplete: str) -> Values:

@@ -5,16 +5,12 @@ The numbers are made by ``docs/scripts/make_effect_catalogue.py`` and stored wit
 
 from __future__ import annotations
 
-import json
 import re
 import textwrap
-from collections.abc import Mapping
-from functools import cache
-from typing import Any
 from unicodedata import normalize
 
 from gfimu.errors import InputError
-from gfimu.files.model_files import models_directory
+from gfimu.files.model_files import effect_catalogue
 from gfimu.geometry.array import AccelerometerArray
 from sim.effects.base import Effect
 from sim.effects.description import describe
@@ -27,10 +23,7 @@ from sim.effects.registry import (
 )
 from sim.effects.unknown import Unknown
 
-__all__ = ["PLACES", "STORE", "essence", "every_effect", "place_of", "stored_numbers"]
-
-STORE = "effects/catalogue.json"
-"""File of the stored numbers, below the folder of the models."""
+__all__ = ["PLACES", "essence", "every_effect", "place_of"]
 
 PLACES = {
     "geometry": "where chips, axes and the table are",
@@ -88,13 +81,6 @@ def place_of(effect: type[Effect]) -> str:
     return "motion" if moves else _PLACE.get(effect.place, effect.place)
 
 
-@cache
-def stored_numbers() -> Mapping[str, Any]:
-    """Return what was computed of each effect, by name; empty where nothing is stored."""
-    file = models_directory() / STORE
-    return json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
-
-
 def essence(effect: type[Effect]) -> str:
     """Return the essence of an effect's page as plain text: what it is, formula, parameters, rivals, experiment.
 
@@ -125,7 +111,7 @@ def essence(effect: type[Effect]) -> str:
 
 def _rivals(name: str) -> list[str]:
     """Return, of each standard motion, the effects that it does not separate from one; nothing where none is stored."""
-    motions = stored_numbers().get(name, {}).get("motions", {})
+    motions = effect_catalogue().get(name, {}).get("motions", {})
     lines = []
     for motion, one in motions.items():
         alike = [rival for rival, _, nats in one["rivals"] if nats < _SEPARATED]

@@ -10,7 +10,7 @@ import sys
 
 import pytest
 
-from gfimu.cli.effect_names import EFFECT_NAMES
+from gfimu.cli.completion import effects, shown
 from gfimu.commands.catalogue import catalogue
 
 PROGRAM = [sys.executable, "-c", "from gfimu.cli import main; main()"]
@@ -72,7 +72,9 @@ def test_bash_is_offered_names_and_values(completed, line, offered):
 def test_the_names_of_effects_are_those_of_the_library():
     from sim.effects import added_effects
 
-    assert [name for name in catalogue("effects") if name not in added_effects()] == list(EFFECT_NAMES)
+    listed = [name for name in catalogue("effects") if name not in added_effects()]
+    assert [name for name, _ in effects("")] == [name for name in listed if name != "unknown"]
+    assert set(listed) <= {name for name, _ in shown("")}
 
 
 @pytest.mark.parametrize(

@@ -4,14 +4,16 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from sim.benchmark.generators import foreign_chips, foreign_motion, foreign_reading
+from sim.benchmark.generators.foreign_chips import EFFECTS as OF_CHIPS
 from sim.benchmark.generators.foreign_effect import PLACES, STAGES, Foreign, Motion, Places
+from sim.benchmark.generators.foreign_motion import EFFECTS as OF_MOTION
+from sim.benchmark.generators.foreign_reading import EFFECTS as OF_READING
 from sim.benchmark.generators.independent_effects import G
 from sim.benchmark.generators.independent_table import read_positions
 
 __all__ = ["FOREIGN", "PLACES", "STAGES", "Motion", "Places", "acting", "by_positions", "noise_free"]
 
-FOREIGN: dict[str, Foreign] = foreign_motion.EFFECTS | foreign_chips.EFFECTS | foreign_reading.EFFECTS
+FOREIGN: dict[str, Foreign] = OF_MOTION | OF_CHIPS | OF_READING
 
 
 def acting(hidden, stage):

@@ -49,9 +49,10 @@ def test_the_tail_of_an_f_test_goes_on_where_it_underflows():
 def test_the_library_explains_what_it_made():
     library = LinearLibrary.of(task_of(the_world("table_tilt")).recording, task_of(the_world("table_tilt")).twin)
     tilt = next(one for one in library.candidates if one.effect == "table_tilt")
-    assert library.explained([tilt]) > 0.9 * (library.chi2 - library.samples)
+    truth = fixed_world(the_world("table_tilt")).truth
+    assert np.sqrt(library.explained([tilt])) == pytest.approx(truth.distance, abs=3.0)  # d′, and slow noise
     (cause,) = library.causes([tilt])
-    true = dict(fixed_world(the_world("table_tilt")).truth.hidden)["table_tilt"]
+    true = dict(truth.hidden)["table_tilt"]
     for key in ("x_rad", "y_rad"):
         assert cause["parameters"][key]["value"] == pytest.approx(true[key], abs=6 * cause["parameters"][key]["std"])
 
@@ -152,7 +153,7 @@ def test_answers_for_a_measured_board_are_measured_on_the_other_recording(shared
     silent, other = gfimu.benchmark.judge(found.answers, data=shared_data).judged
     assert (silent.outcome, silent.removed, other.removed) == ("measured", 0.0, 0.0)
     assert np.isnan(silent.points)
-    far = {"a1_x_m": {"value": 0.02, "std": 1e-4}}
+    far = {"m1_x_m": {"value": 0.02, "std": 1e-4}}
     cause = {"effect": "sensor_position", "parameters": far}
     moved = answer_of({"world": "real/test/000", "verdict": "explained", "causes": [cause]}, "test")
     (judged,) = judge([moved], shared_data)
