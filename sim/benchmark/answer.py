@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import lzma
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -10,12 +9,9 @@ from typing import Annotated, Any, Literal
 import msgspec
 
 from gfimu.errors import InputError
-from gfimu.files.atomic_file import atomic_path
+from sim.json_lines import read_lines, six_digits, write_lines
 
 __all__ = ["Answer", "CauseAnswer", "ParameterAnswer", "answer_of", "answer_schema", "read_answers", "write_answers"]
-
-_PACKED = ".xz"
-_SHORT = 6  # digits of stored numbers
 
 
 class ParameterAnswer(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -89,12 +85,7 @@ def read_answers(path: str | Path) -> list[Answer]:
         If the file is not there, holds none, or a line is no answer.
     """
     file = Path(path)
-    try:
-        content = file.read_bytes()
-        lines = (lzma.decompress(content) if file.suffix == _PACKED else content).splitlines()
-    except (OSError, lzma.LZMAError) as error:
-        reason = getattr(error, "strerror", None) or "not packed by xz"
-        raise InputError(f"{file}: {reason}; give answers as lines of JSON (.jsonl or .jsonl.xz)") from None
+    lines = read_lines(file, "give answers as lines of JSON (.jsonl or .jsonl.xz)")
     found = []
     for number, line in enumerate(lines, start=1):
         if line.strip():
@@ -113,14 +104,4 @@ def read_answers(path: str | Path) -> list[Answer]:
 
 def write_answers(answers: Iterable[Answer], path: str | Path) -> None:
     """Write answers as lines of JSON, numbers to six digits, packed where the name ends in ``.xz``."""
-    text = b"".join(msgspec.json.encode(_rounded(msgspec.to_builtins(one))) + b"\n" for one in answers)
-    with atomic_path(Path(path)) as part:
-        part.write_bytes(lzma.compress(text, preset=9) if Path(path).suffix == _PACKED else text)
-
-
-def _rounded(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _rounded(item) for key, item in value.items()}
-    if isinstance(value, list):
-        return [_rounded(item) for item in value]
-    return float(f"{value:.{_SHORT}g}") if isinstance(value, float) else value
+    write_lines(path, (msgspec.json.encode(six_digits(msgspec.to_builtins(one))).decode() for one in answers))

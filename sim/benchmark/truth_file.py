@@ -22,12 +22,12 @@ from typing import Any
 import numpy as np
 
 from gfimu.errors import InputError
-from gfimu.files.atomic_file import atomic_path
 from gfimu.recording import Recording
 from sim.benchmark.drawing import draw
 from sim.benchmark.release import MEASURED, RELEASE, SETS, SPLITS, Case, cases, find_case
 from sim.benchmark.ties import free_distance_and_ties
 from sim.benchmark.world import Task, Truth
+from sim.json_lines import read_lines, six_digits, write_lines
 
 __all__ = ["TRUTH_FILE", "Fixed", "digest_of", "fixed_world", "release_hash", "task_of", "truths"]
 
@@ -36,7 +36,6 @@ TRUTH_FILE = Path(__file__).with_name(f"{RELEASE}.jsonl.xz")
 LEAST_VISIBLE = 7.0
 """d′ with the drive unknown below which what is hidden counts as not to be seen: such a draw is replaced."""
 
-_DIGITS = 6  # kept of numbers of which no prediction is made
 _TACHO_STEP, _KELVIN_STEP = 1e-6, 1e-6  # rad/s and K to which a recording is rounded before it is hashed
 _READING_STEP = 1e-6  # m/s²
 _MOST_DRAWS = 50
@@ -86,7 +85,7 @@ def release_hash() -> str:
 @functools.cache
 def truths() -> Mapping[str, Fixed]:
     """Return what the release says of its worlds, by name."""
-    lines = lzma.decompress(TRUTH_FILE.read_bytes()).decode().splitlines()
+    lines = read_lines(TRUTH_FILE, "reinstall gfimu")
     return {entry["world"]: _read(entry) for entry in map(json.loads, lines)}
 
 
@@ -132,7 +131,7 @@ def make(case: Case) -> dict[str, Any]:
 
 
 def _short(value: float) -> float | None:
-    return None if math.isnan(value) else float(f"{value:.{_DIGITS}g}")
+    return None if math.isnan(value) else six_digits(value)
 
 
 def _read(entry: Mapping[str, Any]) -> Fixed:
@@ -160,11 +159,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     with ProcessPoolExecutor(options.workers) as pool:
         lines = []
         for entry in pool.map(make, listed):
-            lines.append(json.dumps(entry) + "\n")
+            lines.append(json.dumps(entry))
             sys.stdout.write(f"{entry['world']} draw {entry['attempt']} ties {entry['ties']}\n")
             sys.stdout.flush()
-    with atomic_path(options.out) as part:
-        part.write_bytes(lzma.compress("".join(lines).encode(), preset=9))
+    write_lines(options.out, lines)
     return 0
 
 

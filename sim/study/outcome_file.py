@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import json
-import lzma
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from gfimu.errors import InputError
-from gfimu.files.atomic_file import atomic_path
+from sim.json_lines import read_lines, six_digits, write_lines
 from sim.study.cases import find_case
 from sim.sweep.dataset import Dataset
 
 __all__ = ["generator_name", "keep_outcomes", "outcome_of_row", "read_outcomes"]
 
-_PACKED = ".xz"
+_REMEDY = "give a folder of `python -m sim.study run`"
 
 
 def generator_name(source: str) -> str:
@@ -36,16 +35,16 @@ def read_outcomes(path: str | Path) -> list[dict[str, Any]]:
     if file.is_dir():
         dataset = Dataset.open(file)
         if dataset.plan.kind != "study":
-            raise InputError(f"{file}: is another campaign; give a folder of `python -m sim.study run`")
+            raise InputError(f"{file}: is another campaign; {_REMEDY}")
         return [outcome_of_row(row) for row in dataset.table().to_pylist()]
     if not file.exists():
         return []
     try:
-        content = file.read_bytes()
-        lines = (lzma.decompress(content) if file.suffix == _PACKED else content).splitlines()
-        return [json.loads(line) for line in lines]
-    except (lzma.LZMAError, ValueError):
-        raise InputError(f"{file}: no file of outcomes; give a folder of `python -m sim.study run`") from None
+        return [json.loads(line) for line in read_lines(file, _REMEDY)]
+    except InputError:
+        raise
+    except ValueError:
+        raise InputError(f"{file}: no file of outcomes; {_REMEDY}") from None
 
 
 def outcome_of_row(row: Mapping[str, Any]) -> dict[str, Any]:
@@ -61,17 +60,7 @@ def outcome_of_row(row: Mapping[str, Any]) -> dict[str, Any]:
 
 def keep_outcomes(outcomes: Sequence[Mapping[str, Any]], path: str | Path) -> Path:
     """Write outcomes packed (``.xz``), numbers to six digits, to make the tables again from; return the path."""
-    lines = [json.dumps(_rounded(outcome)) + "\n" for outcome in outcomes]
     file = Path(path)
     file.parent.mkdir(parents=True, exist_ok=True)
-    with atomic_path(file) as temporary:
-        temporary.write_bytes(lzma.compress("".join(lines).encode(), preset=9))
+    write_lines(file, (json.dumps(six_digits(outcome)) for outcome in outcomes))
     return file
-
-
-def _rounded(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _rounded(item) for key, item in value.items()}
-    if isinstance(value, list):
-        return [_rounded(item) for item in value]
-    return float(f"{value:.6g}") if isinstance(value, float) else value

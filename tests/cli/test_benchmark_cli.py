@@ -47,7 +47,7 @@ def test_run_judge_and_table(gfimu_command, tmp_path):
 @pytest.mark.parametrize(
     ("words", "remedy"),
     [
-        (("run", "always_unknown", "--sets", "owm"), "did you mean"),
+        (("run", "always_unknown", "--sets", "independant"), "did you mean"),
         (("run", "always_unknown", "--split", "train"), "valid"),
         (("run", "gfimo"), "did you mean"),
         (("judge", "none.jsonl"), "none.jsonl"),
