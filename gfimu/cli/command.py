@@ -12,7 +12,7 @@ from typer.core import TyperCommand, TyperGroup
 
 from gfimu.cli.former_options import FORMER_OPTIONS
 from gfimu.cli.help_text import write_help
-from gfimu.errors import nearest_name
+from gfimu.errors import did_you_mean, nearest_name
 
 __all__ = ["CONTEXT", "CommandApp", "GfimuCommand", "GfimuGroup", "with_width"]
 
@@ -72,8 +72,7 @@ class GfimuGroup(TyperGroup):
         """Find a command by its name; the error for a wrong one names the nearest."""
         name = args[0]
         if self.get_command(ctx, name) is None and not name.startswith("-") and not ctx.resilient_parsing:
-            near = nearest_name(name, self.list_commands(ctx))
-            ctx.fail(f"No such command {name!r}" + (f"; did you mean {near!r}?" if near else "."))
+            ctx.fail(f"No such command {name!r}{did_you_mean(name, self.list_commands(ctx))}")
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:

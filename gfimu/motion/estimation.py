@@ -42,7 +42,7 @@ from gfimu.recording import Recording
 from gfimu.recording.carried_array import array_metadata
 from gfimu.recording.checks import Finding, check_recording, refuse_or_warn, without_dead_channels
 from gfimu.recording.clipping import without_clipped
-from gfimu.results import Panel, PlottedResult, Series, axis_series
+from gfimu.results import Panel, RunResult, Series, axis_series
 from gfimu.short_repr import joined, timing
 from gfimu.units import STANDARD_GRAVITY
 
@@ -54,7 +54,7 @@ _LEVEL_SECONDS = 1.0
 
 
 @dataclass(frozen=True)
-class Estimate(PlottedResult):
+class Estimate(RunResult):
     """Motion of the body at each sample of a recording; NaN where it could not be found.
 
     Parameters
@@ -149,18 +149,6 @@ class Estimate(PlottedResult):
             if values is not None:
                 panels.append(Panel(title, label, axis_series(values), self.t_s))
         return panels
-
-    def to_rerun(self, path: str | Path) -> Path:
-        """Write the run as a rerun recording, ``.rrd``: the rig in 3-D, channels, and the estimate over time.
-
-        Raises
-        ------
-        InputError
-            If the name does not end in ``.rrd``, its folder can't be written to, or the array is not known.
-        """
-        import gfimu  # pictures stand above what they show
-
-        return gfimu.view(self, out=path)
 
     def to_columns(self) -> dict[str, NDArray[Any]]:
         """Return the columns of the Estimate file, by name with unit."""

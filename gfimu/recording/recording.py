@@ -24,7 +24,7 @@ from gfimu.files.table_columns import TableColumns
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording.carried_array import array_metadata, carried_array, with_carried_array
 from gfimu.recording.file import read_recording_file
-from gfimu.results import Panel, PlottedResult, Series, axis_series
+from gfimu.results import Panel, RunResult, Series, axis_series
 from gfimu.short_repr import joined, timing
 
 __all__ = ["Recording"]
@@ -39,7 +39,7 @@ def _few(names: list[str]) -> str:
 
 
 @dataclass(frozen=True)
-class Recording(PlottedResult):
+class Recording(RunResult):
     """Samples of an accelerometer array and its references.
 
     Parameters
@@ -144,18 +144,6 @@ class Recording(PlottedResult):
             if name in self.reference:
                 panels.append(Panel(label.partition(",")[0], label, (Series("", self.reference[name]),), self.t_s))
         return panels
-
-    def to_rerun(self, path: str | Path) -> Path:
-        """Write the run as a rerun recording, ``.rrd``: the rig in 3-D, channels, and the estimate over time.
-
-        Raises
-        ------
-        InputError
-            If the name does not end in ``.rrd``, its folder can't be written to, or the array is not known.
-        """
-        import gfimu  # pictures stand above what they show
-
-        return gfimu.view(self, out=path)
 
     @property
     def sample_period(self) -> float:

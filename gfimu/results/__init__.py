@@ -6,11 +6,12 @@ A result describes itself once, as columns, facts and panels; tables, pages and 
 from gfimu.results.figure import drawn_chips
 from gfimu.results.html import result_html
 from gfimu.results.panels import Panel, Series, axis_series, text_column
-from gfimu.results.result import PlottedResult, TableResult
+from gfimu.results.result import PlottedResult, RunResult, TableResult
 
 __all__ = [
     "Panel",
     "PlottedResult",
+    "RunResult",
     "Series",
     "TableResult",
     "axis_series",

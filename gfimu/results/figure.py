@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.results.panels import Panel, Series
+from gfimu.results.panels import OF_TIME, Panel, Series
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
@@ -119,7 +119,7 @@ def _draw_names(axes: Any, panel: Panel) -> None:
     turned = len(names) > _MANY_NAMES or max(map(len, names), default=0) > 14
     axes.set_xticks(places, names, rotation=60 if turned else 0, ha="right" if turned else "center", fontsize=8)
     axes.set_xlim(-0.6, len(names) - 0.4)
-    if panel.x_label and panel.x_label != "time, s":
+    if panel.x_label and panel.x_label != OF_TIME:
         axes.set_xlabel(panel.x_label)
 
 

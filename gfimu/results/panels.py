@@ -8,7 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Panel", "Series", "axis_series", "text_column"]
+__all__ = ["OF_TIME", "Panel", "Series", "axis_series", "text_column"]
+
+OF_TIME = "time, s"
+"""Label along a line over time."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +69,7 @@ class Panel:
     y_label: str
     series: tuple[Series, ...]
     x: NDArray[np.float64] | tuple[str, ...]
-    x_label: str = "time, s"
+    x_label: str = OF_TIME
     scale: str = "linear"
 
     @property

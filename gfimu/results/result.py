@@ -1,4 +1,4 @@
-"""The two classes that results inherit from: with a table, and with a picture as well."""
+"""The classes that results inherit from: with a table, with a picture as well, and with a rig in 3-D."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import json
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar, overload
+from typing import TYPE_CHECKING, Any, TypeVar, cast, overload
 
 from numpy.typing import NDArray
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     _Canvas = TypeVar("_Canvas", Figure, SubFigure)
 
-__all__ = ["PlottedResult", "TableResult"]
+__all__ = ["PlottedResult", "RunResult", "TableResult"]
 
 
 class TableResult(ABC):
@@ -172,3 +172,26 @@ class PlottedResult(TableResult):
         from gfimu.results.stream import write_result
 
         return write_result(path, type(self).__name__.lower(), self._heading(), self._facts(), self._panels())
+
+
+class RunResult(PlottedResult):
+    """What belongs to a run, a recording or what was made of one: its rerun recording is that of `gfimu.view`."""
+
+    __slots__ = ()
+
+    def to_rerun(self, path: str | Path) -> Path:
+        """Write the run as a rerun recording, ``.rrd``: the rig in 3-D, and the channels and results over time.
+
+        Parameters
+        ----------
+        path : str or Path
+            File to write.
+
+        Raises
+        ------
+        InputError
+            If the name does not end in ``.rrd``, its folder can't be written to, or the array is not known.
+        """
+        import gfimu  # the command stands above what it shows
+
+        return gfimu.view(cast("Any", self), out=path)

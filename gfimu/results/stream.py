@@ -11,15 +11,13 @@ import numpy as np
 
 from gfimu.files.outputs import RERUN, check_outputs
 from gfimu.files.rerun_stream import rrd_stream
-from gfimu.results.panels import Panel
+from gfimu.results.panels import OF_TIME, Panel
 
 if TYPE_CHECKING:
     import rerun as rr
     import rerun.blueprint as rrb
 
 __all__ = ["log_result", "write_result"]
-
-_OF_TIME = "time, s"
 
 
 def write_result(
@@ -89,7 +87,7 @@ def _view(panel: Panel, entity: str) -> rrb.BarChartView | rrb.TimeSeriesView:
 
 
 def _as_bars(panel: Panel) -> bool:
-    return panel.by_name or panel.x_label != _OF_TIME
+    return panel.by_name or panel.x_label != OF_TIME
 
 
 def _part(text: str) -> str:

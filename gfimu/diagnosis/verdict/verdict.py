@@ -16,7 +16,7 @@ from gfimu.diagnosis.criticism.views.rigid_motion import RigidMotion
 from gfimu.diagnosis.criticism.views.run_view import RunView
 from gfimu.diagnosis.policy import Policy
 from gfimu.files.atomic_file import write_text
-from gfimu.results import Panel, PlottedResult, Series
+from gfimu.results import Panel, RunResult, Series
 from gfimu.short_repr import joined
 from gfimu.world_model import WorldModel
 
@@ -179,7 +179,7 @@ class Unexplained:
 
 
 @dataclass(frozen=True)
-class Diagnosis(PlottedResult):
+class Diagnosis(RunResult):
     """The result of a diagnosis.
 
     Parameters
@@ -342,18 +342,6 @@ class Diagnosis(PlottedResult):
         import gfimu  # the report stands above the verdict
 
         return gfimu.write_report(self, folder)
-
-    def to_rerun(self, path: str | Path) -> Path:
-        """Write measured and predicted channels and the rig in 3-D as a rerun recording, ``.rrd``.
-
-        Raises
-        ------
-        InputError
-            If the name does not end in ``.rrd``, or its folder can't be written to.
-        """
-        import gfimu  # the picture stands above the verdict
-
-        return gfimu.view(self, out=path)
 
     @property
     def in_part(self) -> bool:
