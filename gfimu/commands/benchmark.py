@@ -118,7 +118,20 @@ def methods() -> dict[str, str]:
 
 
 def benchmark_list() -> BenchmarkList:
-    """List the sets of the benchmark, their sizes and licences, and the methods that come with it."""
+    """List the sets of the benchmark, their sizes and licences, and the methods that come with it.
+
+    Raises
+    ------
+    MissingPackageError
+        If MuJoCo is not installed.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> found = gfimu.benchmark_list()
+    >>> [one["name"] for one in found.sets]
+    ['own', 'independent', 'unlisted', 'dcmotor', 'real']
+    """
     require("gfimu benchmark", "mujoco")
     from sim.benchmark.release import RELEASE, SETS, SPLITS, cases
     from sim.benchmark.truth_file import release_hash

@@ -85,10 +85,21 @@ def schema(command: str, *, out: str | Path | None = None) -> dict[str, Any]:
     out : str or Path, optional
         File to write, ``.json``.
 
+    Returns
+    -------
+    dict
+        The schema.
+
     Raises
     ------
     InputError
         If there is no such command.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> sorted(gfimu.schema("check")["$defs"])[:2]
+    ['Checked', 'CheckedEffect']
     """
     import json
 

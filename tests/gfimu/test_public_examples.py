@@ -14,11 +14,12 @@ NO_EXAMPLE = {
     "InputError",
     "RecordingWarning",
     "UnitError",
+    "benchmark",
     "firmware",
     "posterior_rate_bound",
     "update_array_calibration",
 }
-"""Names that need none: errors of one kind, a module, and two functions whose example would be a page."""
+"""Names that need none: errors of one kind, modules, and two functions whose example would be a page."""
 
 
 def of_name(name):
