@@ -534,6 +534,13 @@ def test_few_modules_are_in_no_room():
     }
 
 
+@pytest.mark.parametrize("package", PACKAGES)
+def test_every_room_is_described(package):
+    page = (ROOT / "docs" / "development" / "rooms.md").read_text(encoding="utf-8")
+    rooms = {file.parent.name for file in (ROOT / package).glob("*/__init__.py")}
+    assert {room for room in rooms if f"`{room}`" not in page} == set()
+
+
 def test_the_slow_tests_are_there():
     """A test that is renamed would run in the usual suite again, without a word."""
     lines = (ROOT / "tests" / "slow_tests.txt").read_text(encoding="utf-8").splitlines()
