@@ -69,7 +69,12 @@ def test_models_lie_inside_the_wheel(installed: Path) -> None:
     for name in ("plots.js", "plots.css", "uplot/uPlot.iife.min.js", "uplot/uPlot.min.css", "uplot/LICENSE"):
         assert (page / name).is_file(), name
     assert (installed / "gfimu" / "diagnosis" / "report" / "templates" / "report.css").is_file()
+    assert (installed / "sim" / "models" / "effects" / "catalogue.json").is_file()
+    assert (installed / "sim" / "benchmark" / "gfimu-bench-1.jsonl.xz").is_file()
     assert not (installed / "tests").exists()
+    (licences,) = installed.glob("*.dist-info/licenses")
+    assert (licences / "LICENSE").is_file()
+    assert "Leon Sorokin" in (licences / "gfimu/visual/page/uplot/LICENSE").read_text(encoding="utf-8")
 
 
 def test_type_checkers_find_types_in_the_wheel(installed: Path) -> None:
