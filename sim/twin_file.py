@@ -1,4 +1,4 @@
-"""The twin file: what a simulation believes of a rig."""
+"""The twin file: what a simulation assumes of a rig."""
 
 from __future__ import annotations
 

@@ -309,7 +309,7 @@ def diagnose_hidden(demo: Demo) -> None:
         effects=tuple(make_effect(name, parameters) for name, parameters in hidden.items()),
     )
     recording = simulate(calibrated, seed=demo.seed, out=demo.out / "hidden.parquet")
-    twin = Twin.load(_TWIN)  # believes in a level table with the cube on its axis
+    twin = Twin.load(_TWIN)  # assumes a level table with the cube on its axis
     found = diagnose([recording], twin, names=["hidden.parquet"])
     demo.written["diagnosis report"] = write_report(found, demo.out / "diagnosis")
     causes = {cause.effect: cause for cause in found.causes}

@@ -43,7 +43,7 @@ def diagnose(
     recordings : sequence of Recording
         One or several runs of the same unit; each may have its own mounting in its metadata.
     model : WorldModel
-        What the simulation believes.
+        What the simulation assumes.
     held_out : sequence of Recording
         Runs that are kept for the gate and the gain.
     names : sequence of str, optional

@@ -49,7 +49,7 @@ class LibraryDiagnosis:
     prepared, kept : PreparedRuns
         Runs to explain, and those kept for the gain, if any.
     model : WorldModel
-        What the simulation believes.
+        What the simulation assumes.
     policy : Policy
         Thresholds.
     report : callable
@@ -99,9 +99,9 @@ class LibraryDiagnosis:
         refuted = judge(gain, found.residual, [one for one in found.causes if one.effect in fitted], policy).why
         if refuted:
             return self._described(understanding, left, withdrawn, refuted)
-        told = measurable(gain)
-        if told is not gain:
-            found = conclude(self._prepared, understanding, left, told, policy, withdrawn=withdrawn)
+        gained = measurable(gain)
+        if gained is not gain:
+            found = conclude(self._prepared, understanding, left, gained, policy, withdrawn=withdrawn)
         return self._doubted(found, understanding.explanation)
 
     def so_far(self, understanding: Understanding) -> Diagnosis:
@@ -111,10 +111,10 @@ class LibraryDiagnosis:
         if not explanation.best.causes:
             raise KeyboardInterrupt
         leading = named_causes(explanation, explanation.best, policy)
-        told = f"{_INTERRUPTED}: {'; '.join(one.effect + _sizes(one) for one in leading)}"
+        found_so_far = f"{_INTERRUPTED}: {'; '.join(one.effect + _sizes(one) for one in leading)}"
         left = self._left(explanation)
-        found = conclude(self._prepared, understanding, left, Gain(), policy, refuted=told, unknown=True)
-        return replace(found, sentences=(f"No verdict: {told}.", *found.sentences[1:]))
+        found = conclude(self._prepared, understanding, left, Gain(), policy, refuted=found_so_far, unknown=True)
+        return replace(found, sentences=(f"No verdict: {found_so_far}.", *found.sentences[1:]))
 
     def _doubted(self, found: Diagnosis, explanation: Explanation) -> Diagnosis:
         """Return a verdict whose probabilities include that the truth is outside the library."""

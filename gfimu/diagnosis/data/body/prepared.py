@@ -33,7 +33,7 @@ def prepare_bodies(
     recordings : sequence of Recording
         The runs.
     model : BodyModel
-        What the simulation believes.
+        What the simulation assumes.
     names : sequence of str
         Names of the runs, for people.
     spike_share : float
