@@ -1,6 +1,6 @@
 """Are calibrations as sure as they are: errors over standard deviations, by method and array.
 
-Run ``python docs/scripts/calibration_consistency.py [RUNS]``; it prints the table of docs/how_to/calibration.md.
+Run ``python docs/scripts/calibration_consistency.py [RUNS]``; it prints the table of docs/accuracy/calibration.md.
 Every run draws the chips
 anew from their data sheets (offsets, gains, cross-axis pick-up, non-linearity), simulates the poses of the
 scenario ``calibration_poses`` with noise and quantisation, and calibrates the recording as ``gfimu calibrate`` does.

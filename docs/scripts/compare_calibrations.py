@@ -1,6 +1,6 @@
 """Redo the Persian calibration paper's comparison on synthetic poses: three methods times three inputs.
 
-Run ``python docs/scripts/compare_calibrations.py [FOLDER]``; it prints the tables of docs/how_to/calibration.md and
+Run ``python docs/scripts/compare_calibrations.py [FOLDER]``; it prints the tables of docs/accuracy/calibration.md and
 draws the histograms. The truth is a triad with a triangular sensitivity matrix, as the paper's model has it, so that no
 method suffers from the model. Six-position and recursive least squares get the six faces, each tilted by a levelling
 error; multi-position gets 18 poses of the same length with the same tilts, which it does not care about. The check is

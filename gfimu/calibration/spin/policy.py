@@ -15,7 +15,7 @@ class SpinPolicy:
     ----------
     radius_std_m : float
         Each coordinate of a chip against its drawing, m. The sensing element is up to 0.4 mm from the middle of its
-        package (the MIMU4444 of docs/how_to/calibration.md), and a board is soldered to some 0.2 mm.
+        package (the MIMU4444 of docs/accuracy/calibration.md), and a board is soldered to some 0.2 mm.
     stretch_std_s2_rad2 : float
         Arm stretch s, s²/rad²: arms r (1 + s ω²). An aluminium arm of 0.3 m stretches by ρ ω² r²/3E = 1e-9 ω², and its
         joints by more; 1e-7 is one part in 10⁴ at 30 rad/s.

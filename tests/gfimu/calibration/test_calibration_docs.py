@@ -1,4 +1,4 @@
-"""The scripts behind docs/how_to/calibration.md and docs/theory/noise.md, and that the pages quote what they find."""
+"""The scripts behind both pages calibration.md and docs/theory/noise.md, and that the pages quote what they find."""
 
 import importlib.util
 import re
@@ -18,7 +18,9 @@ def load(project_root, name):
 
 @pytest.fixture(scope="module")
 def page(project_root):
-    return (project_root / "docs" / "how_to" / "calibration.md").read_text(encoding="utf-8")
+    """The how-to page and the page of its measurements."""
+    pages = (project_root / "docs" / room / "calibration.md" for room in ("how_to", "accuracy"))
+    return "\n".join(page.read_text(encoding="utf-8") for page in pages)
 
 
 def test_what_holds_of_the_persian_papers_ranking(project_root, tmp_path):
