@@ -3,7 +3,7 @@
 Glossary
 --------
 specific force, f = a − g
-    What an accelerometer reads: at rest +g along "up". Never called acceleration here. m/s².
+    What an accelerometer reads, m/s²: acceleration a less the gravity vector g. At rest it is 9.81 m/s² upwards.
 p
     Specific force of the body origin, in body axes, m/s².
 alpha, α
@@ -11,17 +11,25 @@ alpha, α
 omega, ω
     Angular rate of the body against the world, in body axes, rad/s.
 J, Q
-    Regression matrix (c × 6) and centripetal matrix (c × 6): reading = J [α; p] + Q s, s the six products of ω.
+    Regression matrix (c × 6) and centripetal matrix (c × 6) of c sensing axes: readings = J [α; p] + Q s, with s the
+    six products of the components of ω.
 GDOP
-    √tr((JᵀJ)⁻¹) with lengths in the array's length unit (half the cube's edge).
+    Geometric dilution of precision, √tr((JᵀJ)⁻¹), with lengths in the array's length unit (half the cube's edge).
 bias, scale factor, input-axis misalignment, cross-axis sensitivity
-    Constant offset, gain error, wrong direction of a sensing axis, pick-up of a neighbouring axis (IEEE 528, 1293).
+    Constant offset, gain, angle between a sensing axis and its drawn direction, share of the acceleration across the
+    sensing axis in its reading (IEEE 528, 1293).
 velocity random walk N, bias instability B, acceleration random walk K
-    Coefficients of the Allan deviation of an accelerometer.
+    Coefficients of the Allan deviation of an accelerometer: white noise, 1/f noise and random walk of the bias.
+twin
+    The simulation of a rig that a diagnosis compares with recordings.
+effect
+    One physical error that a rig can have, such as a bias or a tilt of the table; a cause is an effect in a verdict.
+drive
+    Motion of the table over time.
 
 Frames: world with z up; table frame turned by θ about the table's axis; body (cube) frame with its origin at the
 cube's centre. Attitude quaternions (w, x, y, z) turn body axes into world axes.
-Units: SI inside, everywhere; angles in rad, rates in rad/s. Units stand in every column name and file key.
+Units: SI throughout; angles in rad, rates in rad/s. Every column name and file key ends with its unit.
 """
 
 from __future__ import annotations

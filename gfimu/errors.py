@@ -86,11 +86,11 @@ class OmittedFileWarning(GfimuWarning):
 
 
 class RecordingWarning(GfimuWarning):
-    """Something about a recording that a user should know, though it can be used."""
+    """A finding about a recording that its user should know, though the recording can be used."""
 
 
 class CorruptValueWarning(RecordingWarning):
-    """Values of a recording that can be no measurement were left out."""
+    """A recording has values that can't be measurements; they were left out."""
 
 
 @contextmanager

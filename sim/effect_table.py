@@ -15,12 +15,12 @@ __all__ = ["EffectTable"]
 
 
 class EffectTable(Table, frozen=True):
-    """One thing that is so in the world (scenario), or an extension of the model (twin)."""
+    """An effect that the rig has (scenario), or that extends the simulation (twin)."""
 
     name: Annotated[str, about("Name of the effect (gfimu list effects).", example="table_tilt")]
     parameters: Annotated[
         dict[str, Any],
-        about("Its parameters by key, the unit at the end of each key (the table of effects in diagnosis.md)."),
+        about("Its parameters by key, the unit at the end of each key (see the catalogue of effects)."),
     ] = msgspec.field(default_factory=dict)
 
     def effect(self, array: AccelerometerArray, where: str) -> Effect:

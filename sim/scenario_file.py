@@ -88,7 +88,7 @@ class SensorTable(Table, frozen=True):
     ] = SensorSettings.supply
     chips_seed: Annotated[
         Annotated[int, msgspec.Meta(ge=0)] | None,
-        about("Which chips: the seed of their errors.", default="follows from the seed of the run"),
+        about("Seed of the errors of the chips.", default="follows from the seed of the run"),
     ] = None
     errors: Annotated[bool, about("Biases, gains, cross-axis sensitivity, non-linearity, temperature.")] = True
     noise: Annotated[bool, about("White noise.")] = True
@@ -164,8 +164,10 @@ class ReferenceTable(Table, frozen=True):
 class TemperatureTable(Table, frozen=True):
     """Temperature of the board."""
 
-    start_degC: Annotated[float, about("At the start.", "°C")] = 25.0
-    final_degC: Annotated[float | None, about("In the end.", "°C", default="that of the start")] = None
+    start_degC: Annotated[float, about("Temperature at the start.", "°C")] = 25.0
+    final_degC: Annotated[
+        float | None, about("Temperature approached in the end.", "°C", default="that of the start")
+    ] = None
     time_constant_s: Annotated[Positive, about("Time constant between the two.", "s")] = 600.0
 
     def course(self) -> Triple:
@@ -175,7 +177,7 @@ class TemperatureTable(Table, frozen=True):
 
 
 class ScenarioFile(Table, frozen=True):
-    """A run to simulate: motion, array, sensors, references, and what is wrong in that world.
+    """A run to simulate: motion, array, sensors, references, and the effects that the rig has.
 
     A twin file is a scenario too: its world, moved as in the scenario ``paper_run``.
     """
@@ -185,7 +187,7 @@ class ScenarioFile(Table, frozen=True):
         about("Name of an array (gfimu list arrays), or the path of an array file beside this file.", example="cube12"),
     ]
     name: Annotated[str, about("Name of the scenario.", default="the name of the file")] = ""
-    description: Annotated[str, about("One line for people.")] = ""
+    description: Annotated[str, about("Description, one line.")] = ""
     duration_s: Annotated[Positive | None, about("Length of the run.", "s", default="the length of the motion")] = None
     sample_rate_hz: Annotated[Positive, about("Sample rate.", "Hz")] = 100.0
     gravity_m_s2: Annotated[

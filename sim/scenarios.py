@@ -43,7 +43,7 @@ _BLOCK = 20_000  # samples between two reports of progress
 
 @dataclass(frozen=True)
 class Scenario:
-    """A run to simulate.
+    """A run to simulate: array, motion, sensors, effects.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ class Scenario:
     temperature : tuple of float
         Board temperature at the start and in the end, °C, and the time constant between them, s.
     description : str
-        One line for people.
+        Description, one line.
 
     Examples
     --------
@@ -195,7 +195,7 @@ def simulate(
     scenario : Scenario, str or Path
         The scenario, or its name or file.
     seed : int
-        Seed of everything left to chance.
+        Seed of all random numbers.
     out : str or Path, optional
         Recording to write, ``.csv`` or ``.parquet``.
     raw : bool

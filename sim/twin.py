@@ -51,7 +51,7 @@ _REMEMBERED = 16  # numerical: worlds that a twin keeps
 
 @dataclass(frozen=True)
 class Twin:
-    """What the simulation believes of the world.
+    """A simulation's assumptions about a rig: array, mounting, drive, sensors, effects.
 
     Parameters
     ----------

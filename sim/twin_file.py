@@ -19,7 +19,7 @@ Inclination = Annotated[float, msgspec.Meta(ge=0.0, le=math.pi)]
 
 
 class TwinDriveTable(Table, frozen=True):
-    """What drives the simulated rig."""
+    """Reference that drives the simulated rig."""
 
     source: Annotated[
         Literal["tacho", "angle", "command", "gyro", "carriage", "carriage_speed", "carriage_acceleration"],
@@ -46,14 +46,14 @@ class TwinSensorTable(Table, frozen=True):
 
 
 class TwinFile(Table, frozen=True):
-    """What a simulation believes of a rig; effects extend it."""
+    """A simulation's assumptions about a rig; effects extend it."""
 
     array: Annotated[
         str,
         about("Name of an array (gfimu list arrays), or the path of an array file beside this file.", example="cube12"),
     ]
-    name: Annotated[str, about("Name of the twin, for people.")] = ""
-    description: Annotated[str, about("One line for people.")] = ""
+    name: Annotated[str, about("Name of the twin.")] = ""
+    description: Annotated[str, about("Description, one line.")] = ""
     gravity_m_s2: Annotated[Positive, about("Local gravity.", "m/s²")] = STANDARD_GRAVITY
     cube_offset_m: Annotated[
         Triple, about("Body origin from the point of the axis at table height, table frame.", "m")
@@ -62,7 +62,7 @@ class TwinFile(Table, frozen=True):
         Inclination, about("Angle between the table's axis and the vertical; π/2 of a pendulum or a wheel.", "rad")
     ] = 0.0
     carriage_axis: Annotated[
-        Triple, about("Direction of positive places of a linear axis, in the world as the twin believes it.")
+        Triple, about("Direction of positive places of a linear axis, in the twin's world frame.")
     ] = (1.0, 0.0, 0.0)
     mounting: Annotated[
         MountingTable | None,
@@ -75,8 +75,8 @@ class TwinFile(Table, frozen=True):
     sample_rate_hz: Annotated[Positive, about("Nominal sample rate.", "Hz")] = 100.0
     grammar: Annotated[
         bool,
-        about("Whether a diagnosis searches the further effects and the grammar at once, and not only where needed."),
+        about("Whether a diagnosis searches the wider library at once, not only where it is needed."),
     ] = False
-    drive: Annotated[TwinDriveTable, about("What drives the simulated rig.")] = TwinDriveTable()
+    drive: Annotated[TwinDriveTable, about("Reference that drives the simulated rig.")] = TwinDriveTable()
     sensor: Annotated[TwinSensorTable, about("How the chips are set up.")] = TwinSensorTable()
     effect: Annotated[tuple[EffectTable, ...], about("Extensions of the model; a nominal twin has none.")] = ()

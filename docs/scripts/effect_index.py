@@ -30,9 +30,7 @@ def index_page(effects: Mapping[str, type[Effect]], numbers: Mapping[str, Any]) 
         mine = [effect for effect in effects.values() if place_of(effect) == place]
         if not mine:
             continue
-        rows = [
-            "| effect | what is so in the world, missing in the simulation | formula | not separable in a sweep from |"
-        ]
+        rows = ["| effect | what the rig has and the simulation lacks | formula | not separable in a sweep from |"]
         rows.append("|---|---|---|---|")
         for effect in mine:
             sweep = numbers[effect.name]["motions"].get("speed sweep", {"rivals": []})
@@ -49,11 +47,11 @@ def index_page(effects: Mapping[str, type[Effect]], numbers: Mapping[str, Any]) 
 _INTRODUCTION = f"""\
 One page per effect that a simulated rig can have and a diagnosis can name: what it is, its formula, what it changes
 in a run, which effects it is confounded with in which motion, and the experiment that separates them.
-`gfimu list effects` lists them; `gfimu show table_tilt` prints the essence of a page.
+`gfimu list effects` lists them; `gfimu show table_tilt` prints the summary of a page.
 
-The chain is: geometry and gravity → motion → sensing → sampling → data. The reading of an ideal sensor whose axis
-is $\\boldsymbol{{a}}$, at the place $\\boldsymbol{{r}}$ from the table's axis $\\boldsymbol{{z}}$, is the specific
-force there along it:
+The effects follow the chain of a measurement: geometry and gravity → motion → sensing → sampling → data. An ideal
+sensor with the axis $\\boldsymbol{{a}}$, at the place $\\boldsymbol{{r}}$ from the table's axis $\\boldsymbol{{z}}$,
+reads the specific force there along its axis:
 
 $$
 f = \\boldsymbol{{a}} \\cdot \\boldsymbol{{F}}, \\qquad
@@ -74,30 +72,30 @@ $$
 All vectors are in the table's frame, which turns with the array. Each formula is evaluated by a test and compared
 with the forward model.
 
-**Figures on the pages.** *d′* is the size of the effect, in standard deviations, that a motion shows when the
-effect has its usual size and everything else that is unknown (the drive, slow noise) is free. Below {_ANY:.2g} it
-may be missed. *Share* is the part of an effect's whitened energy that a rival explains at its best: the squared
-correlation of their columns after the nuisance parameters. *Nats* is the expected log likelihood by which the
-effect beats the rival; below {SEPARATED:g} two effects are not separable. They are computed as `gfimu check` and
-`gfimu design` do, for `cube12` with ADXL345 chips at 100 Hz. Effects marked ° belong to the wider
-library, which is searched only where the usual effects give no good answer.
+**Figures on the pages.** *d′* is an effect of its usual size, in standard deviations of the data of a motion. All
+other unknowns (the drive, that is the motion of the table, and slow noise) are free. Below {_ANY:.2g} an effect may be
+missed. *Share* is the part of an effect's energy, in units of the noise, that a rival effect can explain at most: the
+squared correlation of the two changes of the data, after the other unknowns are fitted. *Nats* is
+the expected difference of the log likelihoods of the effect and the rival; below {SEPARATED:g} the two are not
+separable. The figures are computed as `gfimu check` and `gfimu design` do, for `cube12` with ADXL345 chips at 100 Hz.
+Effects marked ° belong to the wider library, which is searched only where the usual effects give no good answer.
 
 Motions: *constant spin*, 30 s at 4 rad/s; *speed sweep*, the scenario `speed_sweep`; *tilted rest*, 60 s at rest,
-30° over; *calibration poses*, 18 rests of 6 s with faces and edges up; *tumble* and *in the hand*, the scenarios
+tilted by 30°; *calibration poses*, 18 rests of 6 s with faces and edges up; *tumble* and *in the hand*, the scenarios
 `tumble` and `hand` as a free body with a gyro; *strokes*, the scenario `linear_axis`."""
 
 _OWN = """\
-The pages are made from the code: the words from the docstring of the effect's class (fields under *Notes*, see
-`sim/effects/description.py`), the figures from what the package computes. A new effect is a class, its line in
+The pages are made from the code: the text from the docstring of the effect's class (fields under *Notes*, see
+`sim/effects/description.py`), the figures from computations of the package. A new effect is a class, its line in
 `sim/effects/registry.py`, and
 ```
 python docs/scripts/make_effect_catalogue.py --compute --effect my_effect
 ```
-A test fails as long as a registered effect has no page, picture or formula. A point of the grammar in
-`sim/effects/unlisted_rig.py` or `unlisted_chips.py` is registered in `unlisted.py` and gets its page in the same way.
-For effects that an installed package adds (entry point `gfimu.effects`), `--out FOLDER` writes their pages into a
-folder of that package; `gfimu show` prints what the docstring says. Their rivals are computed with gfimu's own effects,
-as the twin has them all. What a diagnosis calls `unknown` has the page of that name."""
+A test fails as long as a registered effect has no page, picture or formula. An effect of the wider library is in
+`sim/effects/unlisted_rig.py` or `unlisted_chips.py`. It is registered in `unlisted.py` and gets its page in the same
+way. For effects that an installed package adds (entry point `gfimu.effects`), `--out FOLDER` writes their pages into a
+folder of that package; `gfimu show` prints the docstring. Their rivals are computed among gfimu's own effects too. The
+verdict `unknown` has the page of that name."""
 
 
 def _inline(text: Description) -> str:

@@ -20,9 +20,9 @@ INTRODUCTION = """\
 # Files key by key
 <!-- made by make_files_reference.py; edit the schemas that are named below -->
 Arrays, parts, column maps, twins, scenarios, frames, stages, plans and briefs are TOML files. `gfimu list arrays` lists
-those that come with gfimu, `gfimu show cube12` prints one, and `gfimu new array --out my_array.toml` writes a commented
-one to edit. A key that is not on this page is refused, with the nearest one that is; part files may hold further keys
-for people.
+the shipped ones, `gfimu show cube12` prints one, and `gfimu new array --out my_array.toml` writes a commented
+one to edit. A key that is not on this page is refused, and the message names the nearest valid one. Part files may hold
+further keys, which are ignored.
 
 Editors with [taplo](https://taplo.tamasfe.dev) (Even Better TOML in VS Code) complete and check these files by a JSON
 schema. `gfimu new array --out my_array.toml --schema array.schema.json` writes the file, the schema, and the line
@@ -35,21 +35,21 @@ Units stand at the end of a key. Frames and signs are in [Conventions](conventio
 
 AFTER = {
     "array": """\
-`part` names a part of gfimu, or a part file of your own beside the array file or in the current directory. A recording
+`part` names a shipped part, or a part file of your own beside the array file or in the current directory. A recording
 carries the text of both.
 
-A chip's own `supply_V` and `output_data_rate_hz` go before those of a scenario: the simulation takes offset, gain,
+A chip's own `supply_V` and `output_data_rate_hz` override those of a scenario: the simulation takes offset, gain,
 noise, last bit and bandwidth of that chip from them, and estimation its noise. The firmware on the emulated board sets
-the output data rate of all chips itself. `own_clock` is carried with the array and shown; the simulation samples all
+the output data rate of all chips itself. `own_clock` is stored with the array and shown; the simulation samples all
 chips by the board's clock unless an effect (`channel_skew`) changes that.
 """,
     "part": """\
-In the parts that come with gfimu each figure has a mark: `[1]` is the first source at the head of the file, `[1*]` was
-taken from it earlier and not read again, `[derived]` follows from another key, `[unchecked]` is a usual figure for
+In the shipped parts each figure has a mark. `[1]` is the first source at the head of the file. `[1*]` was
+taken from it earlier and not read again. `[derived]` follows from another key. `[unchecked]` is a usual figure for
 which no source was read.
 """,
     "scenario": """\
-Segments fit on a line each: `segment = [{ kind = "hold", duration_s = 3.0 }, …]` under `[motion]`.
+A segment may stand on one line: `segment = [{ kind = "hold", duration_s = 3.0 }, …]` under `[motion]`.
 """,
 }
 

@@ -61,7 +61,7 @@ class Text(Table, frozen=True, tag="text", tag_field="kind"):
 
     columns: Annotated[
         tuple[str, ...],
-        about("what stands between separators: `time`, `sequence`, `temperature`, channels; an empty name is skipped."),
+        about("names between separators: `time`, `sequence`, `temperature`, channels; an empty name is skipped."),
     ] = ()
     optional: Annotated[
         tuple[str, ...], about("columns, the last ones, that a line may lack, such as `temperature`.")
@@ -75,7 +75,7 @@ class Text(Table, frozen=True, tag="text", tag_field="kind"):
         ),
     ] = ""
     wraps_at: Annotated[
-        Positive | None, about("where the time starts over, such as 4294967296 of Arduino's micros().", default="never")
+        Positive | None, about("value at which the time overflows, such as 4294967296 of micros().", default="never")
     ] = None
 
 
@@ -86,7 +86,7 @@ class FormatFile(Table, frozen=True):
     array: Annotated[str, about("array of the board: a name or a file.", example="cube12")]
     clock_hz: Annotated[Positive, about("units of the board's time in a second: 1e6 for µs.", "Hz", example=1e6)]
     stream: Annotated[Packet | Text, about("a packet or a line of text.")]
-    description: Annotated[str, about("note for people.")] = ""
+    description: Annotated[str, about("description, one line.")] = ""
     unit: Annotated[Unit, about("unit of the readings; `lsb`: raw counts.")] = "lsb"
     lsb_m_s2: Annotated[Positive | None, about("size of a count.", "m/s²", default="the part's")] = None
     channels: Annotated[

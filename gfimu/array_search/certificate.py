@@ -80,7 +80,7 @@ class Certificate:
 
     @property
     def text(self) -> str:
-        """One line for people."""
+        """Description, one line."""
         if self.gap < 1e-6:
             return f"certificate: optimal, equal to a proven bound, {self.bound:.5g} ({self.reason})"
         share = f"{100.0 * self.gap:.2g}" if self.gap < 0.095 else f"{100.0 * self.gap:.0f}"

@@ -66,7 +66,7 @@ class FrontPoint:
 
 @dataclass(frozen=True)
 class Front(PlottedResult):
-    """Arrays none of which is worse than another in both objectives, by the first of them.
+    """Pareto front: arrays of which none is worse than another in both objectives, ordered by the first.
 
     Parameters
     ----------

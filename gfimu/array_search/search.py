@@ -48,7 +48,7 @@ _DIGITS = 6  # of positions in units, where rounding costs nothing
 
 @dataclass(frozen=True)
 class SearchResult(PlottedResult):
-    """Best array found.
+    """The best array of a search, with its score and its distance from a proven bound.
 
     Parameters
     ----------

@@ -32,7 +32,7 @@ def posterior_rate_bound(
     rest_std: float = 1e-3,
     smoother: bool = False,
 ) -> NDArray[np.float64]:
-    """Posterior Cramér–Rao bound on ω along a run, with constant biases unknown.
+    """Compute the posterior Cramér–Rao bound on ω along a run with unknown constant biases.
 
     Parameters
     ----------

@@ -87,7 +87,7 @@ def rate_information(array: AccelerometerArray, omega: ArrayLike, noise_std: flo
 
 
 def rate_bound(array: AccelerometerArray, omega: ArrayLike, noise_std: float) -> NDArray[np.float64]:
-    """Cramér–Rao bound of one sample on the components of ω, with α and p unknown.
+    """Compute the Cramér–Rao bound of one sample on the components of ω, with α and p unknown.
 
     Parameters
     ----------

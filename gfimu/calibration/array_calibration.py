@@ -117,7 +117,7 @@ def update_array_calibration(
     rest_threshold: float | None = None,
     min_rest_s: float = 2.0,
 ) -> Calibration:
-    """Carry an array's calibration over to a later run whose biases changed at power-on, from a few poses of it.
+    """Apply an array's calibration to a later run with new turn-on biases, from a few poses of that run.
 
     Parameters
     ----------

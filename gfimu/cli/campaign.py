@@ -42,9 +42,9 @@ def register(app: typer.Typer) -> None:
     """Add the commands."""
     group = CommandApp(
         cls=_Campaigns,
-        help="Run many simulated cases by a plan into one dataset, and summarise it; a second call goes on where one "
-        "ended.\n\nThe word run may be left out.\n\nExamples\n--------\ngfimu campaign plan.toml --out campaign\n"
-        "# How far it is, from another terminal\ngfimu campaign status campaign",
+        help="Run many simulated cases of a plan into one dataset, and summarise it; a second call continues the first."
+        "\n\nThe word run may be left out.\n\nExamples\n--------\ngfimu campaign plan.toml --out campaign\n"
+        "# Its progress, from another terminal\ngfimu campaign status campaign",
         no_args_is_help=True,
         subcommand_metavar="PLAN --out DIR | COMMAND [ARGS]...",
     )

@@ -29,7 +29,7 @@ def _check(
     map_set: MapSetOption = None,
     json: JsonOption = False,
 ) -> None:
-    """Look at recordings before a diagnosis: quality of the data, effects their motion separates, what to record next.
+    """Check recordings before a diagnosis: data quality, effects that their motion separates, what to record next.
 
     Writes nothing.
 

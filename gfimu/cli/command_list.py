@@ -26,10 +26,10 @@ JOBS: dict[str, tuple[Entry, ...]] = {
             "Run the paper's experiment in simulation: geometry, recording, estimate, drift, picture, diagnosis.",
             "demo",
         ),
-        Entry("list", "List what comes with gfimu.", "list"),
+        Entry("list", "List what gfimu ships: arrays, parts, scenarios, twins, effects and other kinds.", "list"),
         Entry(
             "show",
-            "Print a file that comes with gfimu, a checked file of one's own, or the array of a recording.",
+            "Print a shipped file, a file of your own (checked), the array of a recording, or an effect.",
             "show",
         ),
         Entry("new", "Write a commented file to edit.", "new"),
@@ -94,14 +94,14 @@ JOBS: dict[str, tuple[Entry, ...]] = {
     "Find what a simulation gets wrong": (
         Entry(
             "check",
-            "Look at recordings before a diagnosis: quality of the data, effects their motion separates, what to "
-            "record next.",
+            "Check recordings before a diagnosis: data quality, effects that their motion separates, what to record "
+            "next.",
             "check",
         ),
         Entry(
             "diagnose",
-            "Show what a simulation gets wrong against recordings, name the cause, extend the simulation, measure the "
-            "gain.",
+            "Compare recordings with a simulation: name the causes of the difference, extend the simulation, measure "
+            "the gain.",
             "diagnose",
         ),
         Entry("design", "Propose the table profile, or the mounting, that best separates effects.", "design"),
@@ -114,12 +114,13 @@ JOBS: dict[str, tuple[Entry, ...]] = {
     "Design and simulate": (
         Entry(
             "score",
-            "Score array geometries: condition number, GDOP, errors, what ω² leaves, what ω and which faults are seen.",
+            "Score array geometries: condition number, GDOP, errors, leakage of ω², visible products of ω, least "
+            "faults.",
             "score",
         ),
         Entry(
             "optimize",
-            "Search the array of chips in a volume for which an objective is least, or the front of two objectives.",
+            "Search the array of chips in a volume that minimises an objective, or the front of two objectives.",
             "optimize",
         ),
         Entry(
@@ -129,8 +130,7 @@ JOBS: dict[str, tuple[Entry, ...]] = {
         ),
         Entry(
             "tolerance",
-            "Budget what machining and chip tolerances do to α, ω and position: shares, simulated units, what to pay "
-            "for.",
+            "Budget the errors of α, ω and position from machining and chip tolerances: shares, simulated units.",
             "tolerance",
         ),
         Entry(
@@ -140,8 +140,7 @@ JOBS: dict[str, tuple[Entry, ...]] = {
         ),
         Entry(
             "campaign",
-            "Run many simulated cases by a plan into one dataset, and summarise it; a second call goes on where one "
-            "ended.",
+            "Run many simulated cases of a plan into one dataset, and summarise it; a second call continues the first.",
             "campaign",
         ),
         Entry("firmware", "The LPC1768 image in the emulator: run, build, selftest, trace, faults, check.", "firmware"),

@@ -70,7 +70,7 @@ def _diagnose(
     reference_map_set: ReferenceMapSetOption = None,
     json: JsonOption = False,
 ) -> None:
-    """Show what a simulation gets wrong against recordings, name the cause, extend the simulation, measure the gain.
+    """Compare recordings with a simulation: name the causes of the difference, extend the simulation, measure the gain.
 
     Writes the verdict, the extended twin, a report for people and a rerun recording to a folder. The exit code is 0
     whatever the verdict. After Ctrl-C the result is what had been found by then, and the exit code 130.

@@ -28,7 +28,7 @@ def _list(
     ],
     json: JsonOption = False,
 ) -> None:
-    """List what comes with gfimu.
+    """List what gfimu ships: arrays, parts, scenarios, twins, effects and other kinds.
 
     Examples
     --------

@@ -73,7 +73,7 @@ def _optimize(
     ] = None,
     json: JsonOption = False,
 ) -> None:
-    """Search the array of chips in a volume for which an objective is least, or the front of two objectives.
+    """Search the array of chips in a volume that minimises an objective, or the front of two objectives.
 
     Examples
     --------

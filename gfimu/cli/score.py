@@ -85,7 +85,7 @@ def _score(
     per_channel: Annotated[bool, typer.Option("--per-channel", help="Least fault of every channel.")] = False,
     json: JsonOption = False,
 ) -> None:
-    r"""Score array geometries: condition number, GDOP, errors, what ω² leaves, what ω and which faults are seen.
+    r"""Score array geometries: condition number, GDOP, errors, leakage of ω², visible products of ω, least faults.
 
     Examples
     --------

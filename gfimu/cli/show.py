@@ -29,7 +29,7 @@ def _show(
     ],
     json: JsonOption = False,
 ) -> None:
-    """Print a file that comes with gfimu, a checked file of one's own, or the array of a recording.
+    """Print a shipped file, a file of your own (checked), the array of a recording, or an effect.
 
     A file of one's own is checked by its schema first; exit code 2 if it is wrong.
 

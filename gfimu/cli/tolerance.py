@@ -79,7 +79,7 @@ def _tolerance(
     picture: PictureOption = None,
     json: JsonOption = False,
 ) -> None:
-    """Budget what machining and chip tolerances do to α, ω and position: shares, simulated units, what to pay for.
+    """Budget the errors of α, ω and position from machining and chip tolerances: shares, simulated units.
 
     Examples
     --------

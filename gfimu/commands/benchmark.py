@@ -1,4 +1,4 @@
-"""Under `gfimu benchmark`: the open benchmark of naming what a simulation gets wrong, from its worlds to its table."""
+"""Functions of `gfimu benchmark`: the benchmark of naming what a simulation gets wrong, from worlds to table."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ __all__ = ["CampaignResult", "campaign"]
 
 @dataclass(frozen=True)
 class CampaignResult(PlottedResult):
-    """What is in the folder of a campaign.
+    """Summary of a campaign's folder: cases, results and failures.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def campaign(
     cluster: str = "",
     progress: Callable[[int, int], None] | None = None,
 ) -> CampaignResult:
-    """Run the cases of a plan that the folder lacks, and summarise them; or summarise a folder.
+    """Run the cases of a plan that its folder lacks, and summarise all; or summarise a folder.
 
     Parameters
     ----------

@@ -24,7 +24,7 @@ __all__ = ["CampaignStatus", "CampaignTable", "campaign_plot", "campaign_status"
 
 @dataclass(frozen=True)
 class CampaignStatus:
-    """How far a campaign is.
+    """Progress of a campaign: cases done, failed and to come.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ class CampaignStatus:
 
 @dataclass(frozen=True)
 class CampaignTable(PlottedResult):
-    """Quantiles and sensitivities of a campaign.
+    """Quantiles of a campaign's results, and their sensitivities to its factors.
 
     Parameters
     ----------
@@ -157,7 +157,7 @@ def group_panels(groups: Sequence[Group]) -> list[Panel]:
 
 @writes(reads=("folder",))
 def campaign_status(folder: str | Path) -> CampaignStatus:
-    """Say how far a campaign is, also while another process runs it.
+    """Return the progress of a campaign, also while another process runs it.
 
     Raises
     ------

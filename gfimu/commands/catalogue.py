@@ -24,7 +24,7 @@ _FILES = ("arrays", "parts", "maps", "twins", "scenarios", "frames")
 
 
 def catalogue(kind: str) -> dict[str, str]:
-    """Return what comes with gfimu of one kind: name and what it is, one line each.
+    """List what gfimu ships of one kind: name and description, one line each.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def catalogue(kind: str) -> dict[str, str]:
 
 
 def show(name: str) -> str:
-    """Return the text of a file that comes with gfimu, of one's own, of the array in a recording, or of an effect.
+    """Return the text of a shipped file, of a file of your own, of the array in a recording, or of an effect.
 
     Parameters
     ----------

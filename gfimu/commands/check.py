@@ -26,7 +26,7 @@ def check(
     column_map: ColumnMap | str | Path | None = None,
     map_set: Sequence[str] = (),
 ) -> RunCheck:
-    """Look at recordings before a diagnosis: quality of the data, effects their motion separates, what to record next.
+    """Check recordings before a diagnosis: data quality, effects that their motion separates, what to record next.
 
     Parameters
     ----------

@@ -22,12 +22,12 @@ FOLDER = OutputFolder(("run.parquet", "estimate.parquet", "calibration.json", "r
 
 @dataclass(frozen=True)
 class DemoResult:
-    """What the demo found and wrote.
+    """Results of the demo, and the files that it wrote.
 
     Parameters
     ----------
     seed : int
-        Seed of everything left to chance.
+        Seed of all random numbers.
     rows : tuple of Row
         The table: questions, answers, what to compare them with.
     files : mapping of str to Path
@@ -63,7 +63,7 @@ def demo(
     out : str or Path
         Folder to write to; made if it isn't there.
     seed : int
-        Seed of everything left to chance.
+        Seed of all random numbers.
     report : callable, optional
         Called before each step with its number from 1, how many there are, and what it does.
 

@@ -56,7 +56,7 @@ class Demo:
     out : Path
         Folder for the files.
     seed : int
-        Seed of everything left to chance.
+        Seed of all random numbers.
     """
 
     out: Path

@@ -55,7 +55,7 @@ def diagnose(
     grammar: bool = False,
     force: bool = False,
 ) -> Diagnosis:
-    """Show what a simulation gets wrong against recordings, name the cause, extend the simulation, measure the gain.
+    """Compare recordings with a simulation: name the causes of the difference, extend the simulation, measure the gain.
 
     Parameters
     ----------

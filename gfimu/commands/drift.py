@@ -27,7 +27,7 @@ __all__ = ["Drift", "EquivalentErrors", "axis_drift", "drift", "drift_from_posit
 
 @dataclass(frozen=True)
 class Drift(PlottedResult):
-    """Position drift: the closed forms, and the Monte Carlo where one was asked for.
+    """Position drift: the budget in closed form, and the Monte Carlo where one was run.
 
     Parameters
     ----------
@@ -159,7 +159,7 @@ def drift_from_position(
     latitude: float | None = None,
     gravity: float = 9.80665,
 ) -> EquivalentErrors:
-    """Work out the bias of p and the rate drift that would explain a measured position error of a unit at rest.
+    """Compute the bias of p and the error of the rate that would explain a measured position error of a unit at rest.
 
     Parameters
     ----------

@@ -34,7 +34,7 @@ def drift_of_rest(
     map_set: Sequence[str] = (),
     force: bool = False,
 ) -> RestDrift:
-    """Navigate through the rests of a recording, where all is error, beside what its noise predicts.
+    """Navigate through the rests of a recording, and compare the errors with the prediction from its noise.
 
     Parameters
     ----------

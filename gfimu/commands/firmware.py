@@ -1,4 +1,4 @@
-"""Under `gfimu firmware`: the LPC1768 image in the emulator: run, build, selftest, trace, faults, check."""
+"""Functions of `gfimu firmware` on the LPC1768 image in the emulator: run, build, selftest, trace, faults, check."""
 
 from __future__ import annotations
 

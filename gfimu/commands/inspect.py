@@ -16,7 +16,7 @@ __all__ = ["inspect"]
 
 @writes(reads=("file",), out=COLUMN_MAP)
 def inspect(file: str | Path, *, table: str = "", out: str | Path | None = None) -> Inspection:
-    """Look at a file of unknown layout: columns, units, rate, gaps, rails, corrupt values, chips, a map to start from.
+    """Analyse a file of unknown layout: columns, units, rate, gaps, rails, corrupt values, chips, a map to start from.
 
     Parameters
     ----------

@@ -31,7 +31,7 @@ def join(
     most_rate_error: float = 0.02,
     force: bool = False,
 ) -> Joined:
-    """Find offset and rate error between two clocks and put channels and reference into one recording.
+    """Find offset and rate error between two clocks, and write channels and reference into one recording.
 
     Parameters
     ----------

@@ -52,7 +52,7 @@ def optimize(
     report: Callable[[Any], None] | None = None,
     n_chips: int | None = None,
 ) -> SearchResult | Front:
-    """Search the array of chips in a volume for which an objective is least, or the front of two objectives.
+    """Search the array of chips in a volume that minimises an objective, or the front of two objectives.
 
     Parameters
     ----------

@@ -51,7 +51,7 @@ def record(
     choose_array: Callable[[tuple[AccelerometerArray, ...]], str] | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> RecordReport | None:
-    """Record from a board, real or virtual, until the time is up, ``stop`` says so, or Ctrl-C.
+    """Record from a board, real or virtual, until the duration ends, ``stop`` returns true, or Ctrl-C.
 
     Parameters
     ----------

@@ -76,7 +76,7 @@ def schema_names() -> tuple[str, ...]:
 
 @writes(out=JSON_SCHEMA)
 def schema(command: str, *, out: str | Path | None = None) -> dict[str, Any]:
-    """Return the JSON schema (2020-12) of what a command prints with ``--json``, errors included.
+    """Return the JSON schema (2020-12) of a command's output with ``--json``, errors included.
 
     Parameters
     ----------

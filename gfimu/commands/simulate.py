@@ -35,7 +35,7 @@ def simulate(
     out : str or Path, optional
         Recording to write, ``.csv`` or ``.parquet``.
     seed : int
-        Seed of everything left to chance.
+        Seed of all random numbers.
     changes : sequence of str
         Changes to keys of the scenario file, such as ``"sensor.range_g=8"`` (``--set``).
     raw : bool

@@ -36,7 +36,7 @@ _MOST_SAMPLES = 6000  # numerical: memory of the first-order maps, 1 GB with 24 
 
 @dataclass(frozen=True)
 class ToleranceResult(PlottedResult):
-    """Errors of an array by its tolerances, before and after calibration.
+    """Errors of an array from its tolerances, before and after a calibration.
 
     Parameters
     ----------
@@ -177,7 +177,7 @@ def tolerance(
     picture: str | Path | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> ToleranceResult:
-    """Budget what machining and chip tolerances do to α, ω and position, and simulate units beside it.
+    """Budget the errors of α, ω and position from machining and chip tolerances, and simulate units to compare.
 
     Parameters
     ----------

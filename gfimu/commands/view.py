@@ -35,7 +35,7 @@ def view(
     force: bool = False,
     on_picture: Callable[[Path], None] | None = None,
 ) -> Path:
-    """Open a run in the rerun viewer, or write its picture.
+    """Open a run in the rerun viewer, or write it as a picture.
 
     Parameters
     ----------

@@ -63,7 +63,7 @@ class ImpactSettings:
 
 @dataclass(frozen=True)
 class Impact(PlottedResult):
-    """One impact.
+    """Measures of one impact: time zero, filtered channels, peaks.
 
     Parameters
     ----------

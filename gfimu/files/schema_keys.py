@@ -112,7 +112,7 @@ def _tables(info: types.StructType, path: str, head: _Head) -> Iterator[TableRow
     keys = [_row(one, properties[one.name].get("description", "")) for one in fields if one not in tables]
     if info.tag is not None:
         default = f'"{info.tag}"' if head.default_tag == info.tag else "required"
-        keys.insert(0, KeyRow(str(info.tag_field), f'`"{info.tag}"`', "", default, "Kind of the table."))
+        keys.insert(0, KeyRow(str(info.tag_field), f'`"{info.tag}"`', "", default, "Kind of this table."))
     yield TableRows(head.text, _unmarked((inspect.getdoc(info.cls) or "").split("\n\nExamples\n")[0]), tuple(keys))
     for one in tables:
         inner = f"{path}.{one.name}".lstrip(".")

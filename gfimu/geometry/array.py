@@ -109,7 +109,7 @@ class AccelerometerArray(TableResult):
     length_unit : float
         Length that scoring calls 1, m (half the cube's edge for a cube).
     description : str
-        One line for people.
+        Description, one line.
     part_files : mapping of str to str
         Text of the part files that are not in ``models/parts``, by the name that the chips use.
     turning_axis : TurningAxis, optional

@@ -85,7 +85,7 @@ class TurningAxisTable(Table, frozen=True):
 
 
 class MountingTable(Table, frozen=True):
-    """The axis about which alone the body turns, in the words of the format's first version."""
+    """Older form of `[turning_axis]`, which can still be read."""
 
     axis: Annotated[Triple, about("Direction of the axis, body frame.", example=[0, 0, 1])]
     origin_m: Annotated[Triple, about("A point of the axis, body frame.", "m")] = (0.0, 0.0, 0.0)
@@ -106,7 +106,7 @@ class ArrayFile(Table, frozen=True):
         about("The chips, in the order of the channels."),
     ]
     name: Annotated[str, about("Name of the array.", default="the name of the file")] = ""
-    description: Annotated[str, about("One line for people.")] = ""
+    description: Annotated[str, about("Description, one line.")] = ""
     length_unit_m: Annotated[
         Positive | None,
         about("Length that scoring calls 1 (half the edge of a cube).", "m", default="the largest coordinate"),

@@ -17,7 +17,7 @@ __all__ = ["gdop", "gdop_lower_bound"]
 
 
 def gdop(positions: ArrayLike, axes: ArrayLike | None = None, *, length_unit_m: float = 1.0) -> NDArray[np.float64]:
-    """GDOP = √tr((JᵀJ)⁻¹) of many geometries at once, without forming or inverting any 6 × 6 matrix.
+    """Compute GDOP = √tr((JᵀJ)⁻¹) of many geometries at once, without forming or inverting any 6 × 6 matrix.
 
     Parameters
     ----------

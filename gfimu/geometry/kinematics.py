@@ -138,7 +138,7 @@ def omega_products(omega: ArrayLike) -> NDArray[np.float64]:
 
 
 def specific_force(array: AccelerometerArray, p: ArrayLike, alpha: ArrayLike, omega: ArrayLike) -> NDArray[np.float64]:
-    """Specific force along each sensing axis of a moving array.
+    """Compute the specific force along each sensing axis of a moving array.
 
     Parameters
     ----------
@@ -168,7 +168,7 @@ def specific_force(array: AccelerometerArray, p: ArrayLike, alpha: ArrayLike, om
 
 
 def pseudo_inverse(array: AccelerometerArray) -> NDArray[np.float64]:
-    """Left inverse S = (JᵀJ)⁻¹Jᵀ of the regression matrix (GF-IMU paper, step 5), shape (6, c).
+    """Compute the left inverse S = (JᵀJ)⁻¹Jᵀ of the regression matrix (GF-IMU paper, step 5), shape (6, c).
 
     Unweighted on purpose: weights for unequal noise would let ω² back into α where J is orthogonal to Q.
 
@@ -200,7 +200,7 @@ def omega_leakage(array: AccelerometerArray) -> NDArray[np.float64]:
 def closed_form(
     array: AccelerometerArray, readings: ArrayLike, *, out: NDArray[np.float64] | None = None
 ) -> MotionEstimate:
-    """Motion from the readings of four tri-axial chips at alternate corners of a cube (eqs 28–29).
+    """Solve for the motion from four tri-axial chips at alternate corners of a cube (eqs 28–29).
 
     Each component of p is a quarter of the sum of four readings, each component of α is 1/(4L) times the signed sum
     of eight. The centripetal terms cancel, so no ω is needed.
@@ -247,7 +247,7 @@ def closed_form(
 def motion_from_readings(
     array: AccelerometerArray, readings: ArrayLike, omega: ArrayLike | None = None
 ) -> MotionEstimate:
-    """Motion from the readings of any array: [α; p] = S a − S Q s(ω) (GF-IMU paper, step 5).
+    """Solve for the motion from the readings of any array: [α; p] = S a − S Q s(ω) (GF-IMU paper, step 5).
 
     Parameters
     ----------
@@ -293,7 +293,7 @@ def motion_from_readings(
 
 
 def joint_form(array: AccelerometerArray, readings: ArrayLike) -> JointEstimate:
-    """Motion and products of ω together, by the least-squares inverse of [J Q]: no ω needed, no recursion.
+    """Solve for motion and products of ω together by the least-squares inverse of [J Q]: needs no ω, no recursion.
 
     Parameters
     ----------
@@ -344,7 +344,7 @@ def joint_covariance(array: AccelerometerArray) -> NDArray[np.float64]:
 
 
 def null_space(array: AccelerometerArray) -> NullSpace:
-    """Whitened left null space of J and what it sees of the products of ω.
+    """Compute the whitened left null space of J, and which products of ω it sees.
 
     Raises
     ------

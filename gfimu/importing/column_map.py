@@ -50,7 +50,7 @@ class ColumnSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     column: _Column
     unit: Annotated[str, _Meta(description="Unit of the numbers times scale, such as m/s^2, g, mg, deg/s, rpm.")]
     scale: Annotated[
-        float, _Meta(description="What one step of the number is, in that unit; negative to turn the axis.")
+        float, _Meta(description="Size of one step of the number, in that unit; negative to turn the axis.")
     ] = 1.0
     offset: Annotated[float, _Meta(description="Number at zero.")] = 0.0
     table: Annotated[str, _Meta(description="Table of the file; by default that of the channels.")] = ""
@@ -77,11 +77,11 @@ class TimeSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     unit: Annotated[
         str, _Meta(description="s, ms, us, ns, min, h, d, or datetime for dates and times of day as texts.")
     ] = "s"
-    scale: Annotated[float, _Meta(description="What one step of the number is, in that unit.", gt=0)] = 1.0
+    scale: Annotated[float, _Meta(description="Size of one step of the number, in that unit.", gt=0)] = 1.0
     rate_hz: Annotated[
         _Positive | None, _Meta(description="Sample rate, Hz, where there is no column, or the column counts samples.")
     ] = None
-    wrap: Annotated[_Positive | None, _Meta(description="Number at which the counter of the times starts anew.")] = None
+    wrap: Annotated[_Positive | None, _Meta(description="Number at which the counter of times overflows.")] = None
     part: Annotated[
         Annotated[int, _Meta(ge=1)] | None,
         _Meta(description="Which part to take, from 1, where the clock starts anew as after a restart of the logger."),
@@ -93,7 +93,7 @@ class TimeSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class TextSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Layout of a text file, where it is not to be found from the file itself."""
+    """Layout of a text file, where it can't be found from the file itself."""
 
     separator: Annotated[str, _Meta(description="Between cells: , ; tab or space.")] = ""
     decimal: Annotated[str, _Meta(description="Decimal mark: . or ,")] = ""
@@ -104,7 +104,7 @@ class TextSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class ColumnMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What the columns of a file are.
+    """Meaning and unit of the columns of a file.
 
     Channels have the names of an array's sensing axes (a11, a12, a13, a21 …), references those of a recording
     (tacho_rad_s, angle_rad, gyro_x_rad_s …).
@@ -117,7 +117,7 @@ class ColumnMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     name: Annotated[str, _Meta(description="Name of the map.")]
     channels: Annotated[dict[str, ColumnSpec], _Meta(description="Sensing axes by the array's channel names.")] = {}
-    summary: Annotated[str, _Meta(description="What writes such files, one line.")] = ""
+    summary: Annotated[str, _Meta(description="Program or device that writes such files, one line.")] = ""
     format: Annotated[
         str, _Meta(description="text, parquet, zip, excel, json, matlab, hdf5, ulog, mcap, rosbag; else by content.")
     ] = ""

@@ -53,7 +53,7 @@ class ColumnView:
 
 @dataclass(frozen=True)
 class Inspection(TableResult):
-    """What a file seems to hold.
+    """Proposed meaning of the columns of a file, with the evidence for it.
 
     Parameters
     ----------

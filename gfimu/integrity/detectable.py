@@ -1,8 +1,8 @@
 """The least fault that the monitor of channels detects and isolates, per channel, in closed form.
 
 A constant fault f on channel i puts f z_i, column i of the whitened null space Z (d, c), into the mean of N samples, on
-top of white noise of covariance 1/N and of the biases of all channels. A bias is known to m before the onset and walks
-by q per second; over T seconds that counts as a constant of variance m² + q T/2 on every channel. So
+top of white noise of covariance 1/N and of the biases of all channels. A bias is known to m before the onset, and its
+variance grows by q per second; over T seconds that counts as a constant of variance m² + q T/2 on every channel. So
 
     C = Zᵀ (1/N + (m² + q T/2) Z Zᵀ)⁻¹ Z                                                                 (1)
 
@@ -11,8 +11,8 @@ f √C_ii. It exceeds the threshold h with a probability of 95 % from
 
     f_i = (√h + 1.65) / √C_ii                                                                            (2)
 
-on. Channel j explains the share cos²_ij = C_ij²/(C_ii C_jj) of it; the fault is isolated where what the others leave,
-C_ii (1 − max cos²) f², exceeds the margin m by its own spread,
+on. Channel j explains the share cos²_ij = C_ij²/(C_ii C_jj) of it; the fault is isolated where the part that no other
+channel explains, C_ii (1 − max cos²) f², exceeds the margin m by its own spread,
 
     C_ii (1 − max cos²) f² ≥ m + 2 · 1.65 √m + 1.65².                                                    (3)
 

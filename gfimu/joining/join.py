@@ -36,7 +36,7 @@ FAR = 0.3
 
 @dataclass(frozen=True)
 class Joined:
-    """A recording with its reference on one clock, and how sure that is.
+    """A recording with its reference on one clock, and the standard deviation of the clock's offset and rate.
 
     Parameters
     ----------

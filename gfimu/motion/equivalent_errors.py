@@ -16,7 +16,7 @@ _DEG_H = math.degrees(1.0) * 3600.0
 
 
 def equivalent_p_bias(position_error: ArrayLike, time: float) -> NDArray[np.float64]:
-    """Constant bias of p that explains a position error of a unit at rest, b = 2 δr / t², m/s².
+    """Compute the constant bias of p that explains a position error of a unit at rest, b = 2 δr / t², m/s².
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def equivalent_p_bias(position_error: ArrayLike, time: float) -> NDArray[np.floa
 def equivalent_rate_drift(
     position_error: ArrayLike, time: float, *, p_bias: ArrayLike = 0.0, gravity: float = STANDARD_GRAVITY
 ) -> NDArray[np.float64]:
-    """Constant rate drift that explains a horizontal position error of a unit at rest, in °/h.
+    """Compute the constant rate error that explains a horizontal position error of a unit at rest, in °/h.
 
     Parameters
     ----------

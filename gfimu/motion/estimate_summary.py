@@ -152,7 +152,7 @@ class EstimateSummary:
 
 
 def summarise(estimate: Estimate, recording: Recording, array: AccelerometerArray) -> EstimateSummary:
-    """Sum up an estimate and compare it with the references of its recording.
+    """Summarise an estimate and compare it with the references of its recording.
 
     Parameters
     ----------

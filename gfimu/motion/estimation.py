@@ -55,7 +55,7 @@ _LEVEL_SECONDS = 1.0
 
 @dataclass(frozen=True)
 class Estimate(RunResult):
-    """Motion of the body at each sample of a recording; NaN where it could not be found.
+    """Motion of the body at each sample of a recording; NaN where it could not be estimated.
 
     Parameters
     ----------

@@ -261,7 +261,7 @@ def estimate_from_rest(
     force: bool = False,
     **options: Any,
 ) -> Estimate:
-    """Estimate the motion with the biases of the first rest taken off.
+    """Estimate the motion after subtracting the biases read at the first rest.
 
     Parameters
     ----------

@@ -37,7 +37,8 @@ class PartFile(Table, frozen=True, forbid_unknown_fields=False):
     """What the data sheet of an accelerometer says, in SI units; lists hold one number per sensing axis.
 
     Estimation needs ``lsb_m_s2``, ``full_range_m_s2``, ``noise_lsb_rms_100_hz`` and ``offset_std_m_s2``, simulation
-    ``range_g`` as well; the rest makes a simulation truer. Other keys are notes for people and are not read.
+    ``range_g`` as well; the other keys make a simulation more
+    accurate. Keys that are not listed here are ignored.
     """
 
     lsb_m_s2: Annotated[
@@ -53,7 +54,7 @@ class PartFile(Table, frozen=True, forbid_unknown_fields=False):
         ),
     ]
     name: Annotated[str, about("Name of the part.", default="the name of the file")] = ""
-    manufacturer: Annotated[str, about("Who makes it.")] = ""
+    manufacturer: Annotated[str, about("Manufacturer.")] = ""
     source: Annotated[str, about("Where the figures are from: data sheet, revision, table.")] = ""
     full_range_m_s2: Annotated[
         Positive | None, about("Largest reading of the widest range.", "m/s²", default="needed for estimates")
@@ -75,7 +76,7 @@ class PartFile(Table, frozen=True, forbid_unknown_fields=False):
         int, about("Word length with full resolution off, in every range; 0: the part has no such mode.", ge=0)
     ] = 0
     noise_density_m_s2_rthz: Annotated[
-        Triple | None, about("Noise density of the data sheet, for people.", "m/s²/√Hz", default="none")
+        Triple | None, about("Noise density of the data sheet, not used.", "m/s²/√Hz", default="none")
     ] = None
     offset_limit_m_s2: Annotated[
         Triple | None,
@@ -122,7 +123,7 @@ class PartFile(Table, frozen=True, forbid_unknown_fields=False):
         Positive | None, about("Output data rate from which the last bit is always zero.", "Hz", default="never")
     ] = None
     supply_nominal_V: Annotated[
-        Positive | None, about("Supply voltage of the figures, for people.", "V", default="unknown")
+        Positive | None, about("Supply voltage of the figures, not used.", "V", default="unknown")
     ] = None
     supply_3_3_V: Annotated[SupplyTable | None, about("Figures at 3.3 V.", default="as at the nominal supply")] = None
 

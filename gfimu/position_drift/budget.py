@@ -232,7 +232,7 @@ def drift_budget(
     offset: tuple[float, float] = (0.0, 0.0),
     gravity: float = STANDARD_GRAVITY,
 ) -> DriftBudget:
-    """Position error after a time from the sensors' errors, through the array's geometry.
+    """Compute the position error after a time from the sensors' errors, through the array's geometry.
 
     Parameters
     ----------

@@ -52,7 +52,7 @@ _LARGEST = 1e6  # numerical: of a source of error, SI
 
 @dataclass(frozen=True)
 class ErrorSources:
-    """Errors that drift comes from; all but the last belong to each sensing axis, independently.
+    """Sensor errors that cause drift; all but the last belong to each sensing axis, independently.
 
     Parameters
     ----------

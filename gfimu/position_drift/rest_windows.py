@@ -48,7 +48,7 @@ _PADDING = 4  # numerical: length of the Fourier transform, of that of the weigh
 
 @dataclass(frozen=True)
 class RestDrift(PlottedResult):
-    """Position errors of a unit at rest, window by window, and what the noise of the recording predicts.
+    """Position errors of a unit at rest, window by window, beside the prediction from the recording's noise.
 
     Parameters
     ----------

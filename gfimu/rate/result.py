@@ -87,7 +87,7 @@ class ChannelReport:
 
 @dataclass(frozen=True)
 class RateEstimate(PlottedResult):
-    """Angular rate and how well it is known.
+    """Angular rate with its standard deviation, sample by sample.
 
     Parameters
     ----------

@@ -38,7 +38,7 @@ _EQUAL_READINGS = 1e-7  # probability per sample at which equal readings count a
 
 @dataclass(frozen=True)
 class SensorErrors:
-    """Errors of the sensors of an array, as far as an estimator should reckon with them.
+    """Errors of the sensors of an array that an estimator takes into account.
 
     Parameters
     ----------

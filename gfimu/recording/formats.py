@@ -32,7 +32,7 @@ class RecordingFormat:
     Parameters
     ----------
     summary : str
-        What writes such files, one line.
+        Program or device that writes such files, one line.
     recognises : callable
         From a path to whether the file is of this format, by its first bytes.
     read : callable

@@ -31,7 +31,7 @@ __all__ = ["MappedFile", "RecordingLike", "mapped_recording", "mapped_reference"
 
 @dataclass(frozen=True)
 class MappedFile(os.PathLike[str]):
-    """A foreign file with the map by which it is read; stands wherever a recording's path does.
+    """A foreign file with the column map by which it is read; may be given wherever a path of a recording may.
 
     Parameters
     ----------

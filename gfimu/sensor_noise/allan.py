@@ -28,7 +28,7 @@ _BLOCK = 8192
 
 @dataclass(frozen=True)
 class AllanDeviation:
-    """Allan deviation of one series.
+    """Allan deviation of one series, with the averaging times at which it was computed.
 
     Parameters
     ----------

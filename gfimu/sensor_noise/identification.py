@@ -77,7 +77,7 @@ class NoiseTerm:
 
 @dataclass(frozen=True)
 class NoiseModel:
-    """Noise terms of one series.
+    """Noise terms of one series, with their standard deviations.
 
     Parameters
     ----------

@@ -23,7 +23,7 @@ class Stage(Table, frozen=True):
     """
 
     stage: Annotated[
-        str, about("What the stage is, such as maker, model, serial number.", example="two-axis stage no. 2")
+        str, about("Identification of the stage: maker, model, serial number.", example="two-axis stage no. 2")
     ]
     source: Annotated[str, about("Where the figures are from: certificate or data sheet, with number and date.")] = ""
     pose_tilt_std_rad: Annotated[
@@ -54,7 +54,7 @@ class Stage(Table, frozen=True):
         about(
             "Local gravity that the calibration was given.",
             "m/s²",
-            default="3e-4, what local anomalies leave of a formula; 0.015 if standard gravity was taken",
+            default="3e-4, the local anomalies that a formula lacks; 0.015 if standard gravity was used",
         ),
     ] = None
     resolution_m_s2: Annotated[

@@ -36,7 +36,7 @@ class SetInfo:
     name : str
         Its name.
     about : str
-        One line for people.
+        Description, one line.
     licence : str
         Licence of its recordings.
     """

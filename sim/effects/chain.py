@@ -114,9 +114,8 @@ class Hysteresis(Effect):
     :symbols: h = lost_m_s2; w = width_m_s2
     :size: 5 mg lost, by choice; the half-width from 2 to 600 mg is searched on a grid.
     :example: lost_m_s2 = 0.1, width_m_s2 = 0.1
-    :experiment: Reverse the rate slowly many times and plot the residual against the reading: a loop that is run
-        through in one sense. A non-linearity is one line there, and a lag a loop that widens with the speed of the
-        reversal.
+    :experiment: Reverse the rate slowly many times and plot the residual against the reading: hysteresis makes a loop
+        of one sense. A non-linearity makes a single line, and a lag a loop that widens with the speed of the reversal.
     """
 
     name = "hysteresis"
@@ -169,8 +168,8 @@ class InterferenceTone(Effect):
     :symbols: A = amplitude_m_s2; ν = frequency_hz; φ = phase_rad
     :size: 2 mg, by choice.
     :example: amplitude_m_s2 = 0.03, frequency_hz = 21.3, phase_rad = 0.0
-    :experiment: Record at rest: the line is all there is besides noise. Record at another sample rate: an aliased line
-        moves, a true one stays.
+    :experiment: Record at rest: the readings are the line and noise alone. Record at another sample rate: an aliased
+        line moves, a true one stays.
     :recordings: None on all channels. One channel of the MIMU4444 (m41) has a tone of 0.14 m/s² that varies between 8
         and 9.4 Hz; its frequency is not fixed and it is on one channel, so that this effect does not describe it.
     """

@@ -48,7 +48,7 @@ class _Discrete(Effect):
 class Noise(_Discrete):
     """More white noise than the part should have.
 
-    All channels have more white noise than the data sheet's figure: a noisy supply, a lower oversampling than assumed,
+    All channels have more white noise than the data sheet's figure: a noisy supply, less oversampling than assumed,
     vibration of the bench.
 
     Notes
@@ -77,7 +77,7 @@ class Noise(_Discrete):
 class BiasRandomWalk(_Discrete):
     """Biases that follow a random walk.
 
-    Each offset makes a random walk of its own, which the Allan deviation shows as a rise with the square root of the
+    Each offset has a random walk of its own. The Allan deviation then rises with the square root of the
     averaging time.
 
     Notes
@@ -178,8 +178,8 @@ class CoarseResolution(_Discrete):
 class WrongRange(_Discrete):
     """A chip configured for another range: its readings are off by a power of two.
 
-    One chip is set to another range than the software assumes, so that its counts are worth 2, 4 or 8 times more or
-    less. κ is the factor on its channels, 1 on the others.
+    One chip is set to another range than the software assumes, so that its counts are 2, 4 or 8 times larger or
+    smaller. κ is the factor on its channels, 1 on the others.
 
     Notes
     -----
@@ -187,7 +187,7 @@ class WrongRange(_Discrete):
     :symbols: κ = factor
     :size: Powers of two only.
     :example: chip = 'a2', factor = 0.5
-    :experiment: Hold the array at rest: the chip reads half or twice gravity. A fault of gain that is no power of two
+    :experiment: Hold the array at rest: the chip reads half or twice gravity. A gain error that is no power of two
         is no wrong range.
     """
 
@@ -218,8 +218,8 @@ class AxisSwap(_Discrete):
     :symbols: i, j = channels
     :size: None: it is there or not.
     :example: channels = ['a11', 'a22']
-    :experiment: Put each axis up in turn and see which column reads +1 g. Columns that read alike in the run, as two
-        vertical ones on a table, can be exchanged without a trace.
+    :experiment: Put each axis up in turn and see which column reads +1 g. Columns with the same readings in the run,
+        such as two vertical ones on a table, can be exchanged without any change of the data.
     """
 
     name = "axis_swap"
@@ -283,7 +283,7 @@ class StuckChannel(_Discrete):
     :size: None: the time is read from the samples.
     :example: channel = 'a11', start_s = 20.0, stop_s = 25.0
     :experiment: Look at the raw counts: a live channel has noise of at least a count. Repeat the run; a fault of one
-        chip comes back on the same channel.
+        chip returns on the same channel.
     """
 
     name = "stuck_channel"
@@ -321,7 +321,7 @@ class DroppedFrames(_Discrete):
     :symbols: p = share
     :size: None: gaps are read from the time stamps.
     :example: share = 0.02
-    :experiment: Record at half the rate or over a faster link: gaps by overload go away.
+    :experiment: Record at half the rate or over a faster link: gaps by overload disappear.
     :recordings: MIMU4444: none in ten minutes.
     """
 

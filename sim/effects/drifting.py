@@ -55,8 +55,8 @@ class BiasTemperature(PerChannel):
 class WarmUp(PerChannel):
     """Offsets that settle exponentially after power-on.
 
-    Offsets start where the cold unit has them, which the calibration knows, and approach another value as the chip
-    warms itself.
+    Offsets start at the values of the cold unit, for which it was calibrated. They approach other values as the chip
+    warms up.
 
     Notes
     -----
@@ -141,8 +141,8 @@ class GainDrift(Effect):
     :symbols: k = slope_1_s
     :size: 2e-4 per second, or 1.2 % in a minute, by choice: a battery under load.
     :example: slope_1_s = 0.0002
-    :experiment: Repeat the same speeds early and late in a run of some minutes. An offset that drifts adds the same at
-        every speed, a gain adds in proportion to the reading.
+    :experiment: Repeat the same speeds early and late in a run of some minutes. A drifting offset adds the same amount
+        at every speed, a drifting gain adds in proportion to the reading.
     """
 
     name = "gain_drift"

@@ -28,8 +28,8 @@ _WHOLE_INERTIA = 1.25
 class Misalignment(Effect):
     """A chip's sensing axes turned against the body.
 
-    A chip is soldered or glued askew, so that its three axes are turned together by a small rotation vector against the
-    drawing. Here F is the specific force at the chip.
+    A chip is soldered or glued at an angle: its three axes are turned together by a small rotation vector relative to
+    the drawing. Here F is the specific force at the chip.
 
     Notes
     -----
@@ -38,8 +38,8 @@ class Misalignment(Effect):
     :size: 0.5°, what soldering leaves of a package of 3 to 5 mm. The ADXL345's own axes are within 0.1° of square (data
         sheet).
     :example: a1_x_rad = 0.01, a1_z_rad = -0.008, a3_y_rad = 0.006
-    :experiment: Put the unit at rest on six faces: each chip then shows gravity in its own axes. Chips against each
-        other are certain; a common turn of all chips needs the faces of the cube as a reference.
+    :experiment: Put the unit at rest on six faces: each chip then shows gravity in its own axes. Turns of chips
+        relative to each other are certain; a common turn of all chips needs the faces of the cube as a reference.
     :recordings: MIMU4444: chips turned on the board by some tenths of a degree; the diagnosis states it as
         `cross_axis`, which contains a turn.
     """
@@ -91,7 +91,7 @@ class SensorPosition(Effect):
     :size: 1 mm, by choice: hand assembly. The place of the element in a package of 3 to 5 mm is seldom stated.
     :example: a1_x_m = 0.002, a2_y_m = -0.0015
     :experiment: Spin upright and with the array on its side. The displacement of an eccentric mounting changes with the
-        mounting, that of a chip goes with the chip. No spin about an axis shows a displacement along it.
+        mounting, that of a chip stays with the chip. No spin about an axis shows a displacement along it.
     :recordings: MIMU4444: up to 0.3 mm, about (0.3, 0.3, 0.1) mm in each chip's own axes, mirrored on the lower side of
         the board: the element is not in the middle of its package. Two recordings agree within 0.1 mm.
     """
@@ -132,11 +132,11 @@ class SensorPosition(Effect):
 class CentrifugalFlex(Effect):
     """Arms that stretch with ω² across the axis, where the load is: each is as long as the present rate makes it.
 
-    The arms that carry the chips give way to their centrifugal load and grow by the share kω². With μ = 1
+    The arms that carry the chips stretch under their centrifugal load by the share kω². With μ = 1
     (``moving_arms``) the growth is a motion of its own.
 
-    With ``moving_arms`` = 1 it also moves while it grows, as a soft rig does, which adds Coriolis and radial
-    acceleration; without, the arm of the moment turns as if rigid.
+    With ``moving_arms`` = 1 the arm also moves while it grows, as in a compliant rig. That adds Coriolis and radial
+    acceleration. With 0 the arm at each moment turns as if rigid.
 
     Notes
     -----
@@ -145,8 +145,9 @@ class CentrifugalFlex(Effect):
     :symbols: k = stretch_s2_rad2; μ = moving_arms
     :size: 2.5e-5 s²/rad², by choice: 0.6 % at 15 rad/s, a printed plastic frame.
     :example: stretch_s2_rad2 = 5e-5, moving_arms = 1
-    :experiment: Spin at several high speeds, upright and with the array on its side: the stretch is of what lies across
-        the axis in that mounting, a non-linearity is of the channel. Stiffen the frame and see it go.
+    :experiment: Spin at several high speeds, upright and with the array on its side: the stretch belongs to the
+        directions across the axis in that mounting, a non-linearity to the channel. A stiffer frame removes the
+        stretch.
     """
 
     name = "centrifugal_flex"
@@ -183,9 +184,9 @@ _CHANCE = 0.2
 class Cogging(Effect):
     """Torque ripple locked to the table's angle.
 
-    The motor's torque has n cycles per revolution (poles, slots, gear teeth), which the speed loop takes back only in
-    part. δ is the error of the angle against the command; the servo is taken to have ω₀ = 2π rad/s and ζ = 0.7, and
-    friction to hold the table below ω₁ = 0.3 rad/s.
+    The motor's torque has n cycles per revolution (poles, slots, gear teeth), which the speed loop compensates only in
+    part. δ is the error of the angle against the command; the servo is assumed to have ω₀ = 2π rad/s and ζ = 0.7, and
+    friction to stop the table below ω₁ = 0.3 rad/s.
 
     Notes
     -----

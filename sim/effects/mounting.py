@@ -35,7 +35,7 @@ class _TwoAxes(Effect):
 class Eccentricity(_TwoAxes):
     """The whole array off the table's axis.
 
-    The array is bolted to the table some millimetres off the axis, so that all chips are on other radii than drawn.
+    The array is bolted to the table some millimetres off the axis, so the radii of all chips differ from the drawing.
 
     Notes
     -----
@@ -43,8 +43,8 @@ class Eccentricity(_TwoAxes):
     :symbols: e = {x,y}_m
     :size: 1 mm, by choice: a hole pattern drilled by hand.
     :example: x_m = 0.003, y_m = -0.002
-    :experiment: Remount the array, turned by 90° on its side, and spin again: the offset is new in the new mounting,
-        places of chips stay. In one mounting it is exactly a common displacement of all chips.
+    :experiment: Remount the array, turned by 90° on its side, and spin again: the offset changes with the mounting,
+        the places of chips do not. In one mounting it is exactly a common displacement of all chips.
     """
 
     name = "eccentricity"
@@ -64,8 +64,8 @@ class Eccentricity(_TwoAxes):
 class MountTilt(_TwoAxes):
     """The array not square to the table's axis.
 
-    The array stands askew on the table: a chip under a corner of the foot, a bracket that is not square. It turns about
-    the cube's centre; F is the specific force at the chip, ρ its place from the centre.
+    The array is tilted on the table: a chip of metal under a corner of the foot, a bracket that is not square. It turns
+    about the cube's centre; F is the specific force at the chip, ρ its place from the centre.
 
     Notes
     -----
@@ -73,7 +73,7 @@ class MountTilt(_TwoAxes):
     :symbols: n = {x,y}_rad
     :size: 0.5°, by choice: 0.9 mm under one edge of a 100 mm cube.
     :example: x_rad = 0.01, y_rad = -0.006
-    :experiment: Remount the array on its side: a tilted mounting is new then, misaligned chips stay as they are. At
+    :experiment: Remount the array on its side: the tilt changes with the mounting, misaligned chips do not. At
         rest alone it is the same as an axis out of level, until the table is turned by half a turn.
     """
 
@@ -140,7 +140,7 @@ class TableTilt(_TwoAxes):
     -----
     :formula: y = f − g·a·turn(n×z, −θ)
     :symbols: n = {x,y}_rad
-    :size: 0.3°, by choice: 5 mm per metre, a bench that nobody levelled.
+    :size: 0.3°, by choice: 5 mm per metre, a bench that was not levelled.
     :example: x_rad = 0.004, y_rad = -0.002
     :experiment: Turn slowly through several whole turns. The residual of the channels across the axis is a sine of the
         table's angle whose amplitude, g times the lean, does not depend on
@@ -243,7 +243,7 @@ class AxisWobble(Effect):
 class Gravity(Effect):
     """Local gravity other than assumed.
 
-    The twin has standard gravity, the lab another one; u is up, in the table's frame.
+    The twin has standard gravity, the laboratory has another value; u is up, in the table's frame.
 
     Notes
     -----
@@ -252,8 +252,9 @@ class Gravity(Effect):
     :size: 0.015 m/s². Gravity at sea level goes from 9.780 m/s² at the equator to 9.832 m/s² at the poles (WGS 84),
         standard gravity is 9.80665 m/s².
     :example: delta_m_s2 = 0.01
-    :experiment: Look it up: the latitude and height of the lab give it to 0.001 m/s². From data alone, tilt the array
-        so that other channels see gravity: a gain that all channels share stays confounded with it for a unit at rest.
+    :experiment: Compute it: the latitude and height of the laboratory give it to 0.001 m/s². From data alone, tilt the
+        array so that other channels see gravity. For a unit at rest a common gain of all channels stays confounded with
+        it.
     """
 
     name = "gravity"

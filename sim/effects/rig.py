@@ -216,7 +216,7 @@ class BenchSway(Effect):
     """The bench sways at a mode of its own, driven by an unbalance that turns with the table.
 
     A mass off the axis turns with the table and drives the bench, which sways at a mode of its own; c and s are its
-    answers to the two parts of the rotating force, p and q the sizes along the room's x and y.
+    responses to the two parts of the rotating force, p and q the sizes along the room's x and y.
 
     Notes
     -----
@@ -226,8 +226,8 @@ class BenchSway(Effect):
     :symbols: ω₀ = 2π·frequency_hz; ζ = damping_ratio; p = {x,y}_cosine_m; q = {x,y}_sine_m
     :size: 1 mm far above the mode, by choice: 100 g at 100 mm on a bench of 10 kg.
     :example: x_cosine_m = 0.001, y_sine_m = 0.001, frequency_hz = 1.5, damping_ratio = 0.05
-    :experiment: Go slowly through the speed at which the bench sways most. Balance the table, or hold the bench: the
-        sway goes with it.
+    :experiment: Pass slowly through the speed at which the bench sways most. Balance the table, or clamp the bench: the
+        sway disappears.
     """
 
     name = "bench_sway"

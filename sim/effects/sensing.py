@@ -17,18 +17,18 @@ __all__ = ["Bias", "CrossAxis", "Quadratic", "ScaleFactor", "VibrationRectificat
 class Bias(PerChannel):
     """Constant offset per channel.
 
-    Each channel reads the same amount too much whatever the unit does: a chip from the reel, one under stress after
-    soldering, or one read at another temperature than it was calibrated at.
+    Each channel reads a constant amount too much, independent of the motion: a chip as delivered, one under stress
+    after soldering, or one read at another temperature than it was calibrated at.
 
     Notes
     -----
     :formula: y = f + b
     :symbols: b = {channel}_m_s2
     :size: Data sheet of the ADXL345 (Rev. E): 35 mg (x, y) and 40 mg (z) typical, 150 and 250 mg at most. The prior of
-        20 mg is smaller by choice: it is that of a unit that was trimmed once.
+        20 mg is smaller by choice: it is that of a unit that was calibrated once.
     :example: a11_m_s2 = 0.2, a22_m_s2 = -0.15, a33_m_s2 = 0.1
     :experiment: Put the unit at rest on six faces. Gravity changes its sign on a channel that is turned over, a bias
-        keeps it. On the table, record the same profile a second time with the array on its side.
+        does not. On the table, record the same profile a second time with the array on its side.
     :recordings: MIMU4444 (eight MPU-9150): up to 64 mg on z of one chip, the same within 1 mg in a second recording;
         between the two, offsets moved by 4 to 24 mm/s². Xsens MTi (IMU-TK's recording): 0.9, −0.8 and 4.4 counts, or
         2, −2 and 11 mm/s², from the factory's figures.
@@ -93,8 +93,8 @@ class ScaleFactor(PerChannel):
 class Quadratic(PerChannel):
     """Second-order non-linearity per channel.
 
-    The reading bends with its size, the same way for both signs: a sensing element whose spring or electrostatic
-    feedback is not symmetric.
+    The reading has an error in proportion to its square, of the same sign for both signs of the reading: a sensing
+    element whose spring or electrostatic feedback is not symmetric.
 
     Notes
     -----
@@ -124,8 +124,8 @@ class Quadratic(PerChannel):
 class VibrationRectification(PerChannel):
     """Mean readings that shift with vibration, as ω⁴.
 
-    Vibration of motor and bearing is rectified by the curvature of the sensing element into a shift of the mean
-    reading. The vibration of a rotating unbalance grows as ω², the square of it as ω⁴.
+    Vibration of motor and bearing is rectified by the second-order non-linearity of the sensing element into a shift of
+    the mean reading. The vibration of a rotating unbalance grows as ω², the square of it as ω⁴.
 
     Notes
     -----
@@ -134,9 +134,9 @@ class VibrationRectification(PerChannel):
     :size: 30 mg at 15 rad/s, by choice. Data sheets of tactical-grade parts state a rectification coefficient per g²
         rms, that of the ADXL345 none.
     :example: a11_m_s2_per_rad4_s4 = 5e-6, a22_m_s2_per_rad4_s4 = -3e-6
-    :experiment: Repeat a run at several speeds with the array on a foam pad or another isolator: rectification falls
-        with the vibration, a gain, a curvature or a stretching arm does not. Or shake the resting unit and look at the
-        mean.
+    :experiment: Repeat a run at several speeds with the array on a foam pad or another isolator: rectification
+        decreases with the vibration; a gain, a second-order non-linearity or a stretching arm does not. Or shake the
+        resting unit and look at the mean.
     """
 
     name = "vibration_rectification"
@@ -176,8 +176,8 @@ class CrossAxis(Effect):
     :size: Data sheets: ±1 % (ADXL345), ±2 % (MPU-9150). The prior is 1 %.
     :example: a11_from_a12 = 0.01, a22_from_a23 = -0.008
     :experiment: Six or more poses at rest give every pair of axes. A chip that is turned as a whole has pick-up of
-        opposite sign in the two directions of a pair; a pick-up that is alike in both directions is no turn. A pure
-        turn of a chip is better called misalignment.
+        opposite sign in the two directions of a pair; a pick-up of the same sign in both directions is no turn. A pure
+        turn of a chip is named misalignment.
     :recordings: MIMU4444: up to 0.7 % from channel to channel, the same in both recordings. Xsens MTi (IMU-TK's
         recording): axes 0.3, 0.9 and 2.1 % off square.
     """

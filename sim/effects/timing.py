@@ -20,8 +20,8 @@ __all__ = ["ChannelSkew", "ClockError", "TachoLatency", "TachoRipple", "TachoSca
 class ChannelSkew(Effect):
     """Chips sampled one after another, not together.
 
-    The host reads the chips one after another over one bus, so that chip i is late by (i − 1)δ, while all readings of a
-    row carry one time.
+    The host reads the chips one after another over one bus. Chip i is late by (i − 1)δ, but all readings of a
+    row have one time stamp.
 
     Notes
     -----
@@ -88,7 +88,7 @@ class TachoLatency(Effect):
     """The reference is late.
 
     The reading of the tachometer arrives late: a filter or a gate time in its electronics, a queue of the host. Its
-    time stamp belongs to what was δ earlier.
+    value is that of a time δ earlier than its time stamp.
 
     Notes
     -----
@@ -189,8 +189,8 @@ class TachoRipple(Effect):
     :symbols: A = amplitude; n = order; φ = phase_rad
     :size: 1 %, by choice: a disc of 10 mm radius that is 0.1 mm off centre.
     :example: amplitude = 0.02, order = 1, phase_rad = 0.4
-    :experiment: Turn slowly and steadily. The lines in the reference have none beside them in the tangential channels,
-        which a table that really turns unevenly would show.
+    :experiment: Turn slowly and steadily. The lines are in the reference alone. A table that really turns unevenly
+        has them in the tangential channels as well.
     """
 
     name = "tacho_ripple"

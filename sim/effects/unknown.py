@@ -26,10 +26,9 @@ _UNITS = {"rate_unit_rad_s": "rad/s", "acceleration_unit_rad_s2": "rad/s²", "du
 
 
 class Unknown(Effect):
-    """A term that describes without a name: ``dependence`` times a coefficient per channel and of the reference.
+    """A dependence without a name: the function ``dependence`` times a coefficient per channel and of the reference.
 
-    Something real that nothing in the library explains, kept as data: h is a function of rate, acceleration, angle or
-    time.
+    It describes an error that no effect of the library explains. h is a function of rate, acceleration, angle or time.
 
     Notes
     -----

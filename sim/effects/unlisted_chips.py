@@ -48,7 +48,8 @@ class _OfSupply(Unlisted):
 class GainBySpeed(_OfSupply):
     """A supply that sags with the speed of the motor.
 
-    The chips share the motor's supply, which sags as the motor draws current; the gain of all chips follows its speed.
+    The chips share the motor's supply, which sags as the motor draws current; the gain of all chips changes with its
+    speed.
 
     Notes
     -----
@@ -57,7 +58,7 @@ class GainBySpeed(_OfSupply):
     :size: 0.5 % at 10 rad/s, by choice. The gain of an ADXL345 rises by 3.5 % on x and y from 2.5 to 3.3 V.
     :example: ratio_per_rad_s = 0.0005
     :experiment: Log the supply voltage of the chips. From the recording alone: steady speeds and ramps in both
-        directions, as each follows another function of the motion.
+        directions, because each cause follows another function of the motion.
     """
 
     name = "gain_by_speed"
@@ -77,7 +78,7 @@ class GainByRateSquared(_OfSupply):
     :size: 0.5 % at 10 rad/s, by choice.
     :example: ratio_per_rad2_s2 = 5e-5
     :experiment: Log the supply voltage of the chips. From the recording alone: steady speeds and ramps in both
-        directions, as each follows another function of the motion.
+        directions, because each cause follows another function of the motion.
     """
 
     name = "gain_by_rate_squared"
@@ -98,7 +99,7 @@ class GainByLoad(_OfSupply):
     :size: 0.5 % at 20 rad/s², by choice.
     :example: ratio_per_rad_s2 = 0.0003
     :experiment: Log the supply voltage of the chips. From the recording alone: steady speeds and ramps in both
-        directions, as each follows another function of the motion.
+        directions, because each cause follows another function of the motion.
     """
 
     name = "gain_by_load"
@@ -184,8 +185,8 @@ class OffsetBySpeed(_OfChannels):
     :symbols: k = {channel}_m_s2_per_rad_s
     :size: 5 mg at 10 rad/s, by choice.
     :example: a11_m_s2_per_rad_s = 0.01, a22_m_s2_per_rad_s = -0.006
-    :experiment: Let the motor turn at speed with the array taken off the table and held beside it: what stays is
-        electrical.
+    :experiment: Let the motor turn at speed with the array taken off the table and held beside it: the remaining offset
+        is electrical.
     """
 
     name = "offset_by_speed"
@@ -205,7 +206,7 @@ class OffsetByLoad(_OfChannels):
     :symbols: k = {channel}_m_s2_per_rad_s2
     :size: 5 mg at 20 rad/s², by choice.
     :example: a11_m_s2_per_rad_s2 = 0.006, a22_m_s2_per_rad_s2 = -0.004
-    :experiment: Make ramps of several steepnesses in both directions. A displaced chip reads αr with the sign of α,
+    :experiment: Make ramps of several accelerations in both directions. A displaced chip reads αr with the sign of α,
         this reads its size.
     """
 
@@ -217,7 +218,8 @@ class OffsetByLoad(_OfChannels):
 class Cubic(_OfChannels):
     """Third-order non-linearity per channel.
 
-    The reading bends with its size, with opposite sign on both sides of zero: the beginning of saturation.
+    The reading has an error in proportion to its cube, of opposite sign on both sides of zero: the beginning of
+    saturation.
 
     Notes
     -----
@@ -248,9 +250,9 @@ class Cubic(_OfChannels):
 
 
 class LaggedTemperature(_OfChannels):
-    """Offsets that follow the board's temperature with a lag: the chip is farther from the heat than the sensor.
+    """Offsets that follow the board's temperature with a lag.
 
-    The thermometer is nearer to the heat than the sensing element, whose temperature T′ follows with a lag.
+    The thermometer is nearer to the heat source than the sensing element, whose temperature T′ follows with a lag.
 
     Notes
     -----
@@ -260,7 +262,7 @@ class LaggedTemperature(_OfChannels):
     :size: 0.8 mg/K, as of `bias_temperature`.
     :example: a11_m_s2_K = 0.02, a22_m_s2_K = -0.015, time_constant_s = 6.0
     :experiment: Change the temperature in steps and hold it: an offset without lag settles with the thermometer, this
-        one after it.
+        one later.
     """
 
     name = "lagged_temperature"
@@ -296,8 +298,8 @@ class LaggedTemperature(_OfChannels):
 class TemperatureGradient(LaggedTemperature):
     """Offsets that follow the difference of temperature within the unit: between the sensor and what lags behind it.
 
-    A difference of temperature within the unit bends its board; it is there while the temperature changes and gone when
-    the unit is evenly warm.
+    A difference of temperature within the unit bends its board; it exists while the temperature changes and vanishes
+    when the temperature is uniform.
 
     Notes
     -----
@@ -306,8 +308,8 @@ class TemperatureGradient(LaggedTemperature):
     :symbols: k = {channel}_m_s2_K; τ = time_constant_s
     :size: 0.8 mg/K, as of `bias_temperature`.
     :example: a11_m_s2_K = 0.03, a22_m_s2_K = -0.02, time_constant_s = 6.0
-    :experiment: Warm the unit from one side and then hold it at the new temperature: the offset comes and goes, one
-        that follows the temperature stays.
+    :experiment: Warm the unit from one side and then hold it at the new temperature: this offset appears and vanishes,
+        one that follows the temperature stays.
     """
 
     name = "temperature_gradient"

@@ -75,7 +75,7 @@ class ReferenceOffset(_OfReference):
 
 
 class ReferenceSpeed(_OfReference):
-    """A reference that reads unlike in both directions.
+    """A reference whose gain differs between the directions.
 
     The gain of the reference is larger in one direction than in the other: brushes of a tachogenerator, a rectifying
     stage.
@@ -97,7 +97,7 @@ class ReferenceSpeed(_OfReference):
 class ReferenceSquare(_OfReference):
     """A reference whose gain grows with the rate.
 
-    The gain of the reference changes in proportion to the rate, alike in both directions: a tachogenerator under the
+    The gain of the reference changes in proportion to the rate, equally in both directions: a tachogenerator under the
     load of its own current.
 
     Notes
@@ -177,9 +177,9 @@ class _OfCube(Unlisted):
 
 
 class LeanByRateSquared(_OfCube):
-    """An array that centrifugal force leans.
+    """An array that leans under the centrifugal force.
 
-    The foot of the array gives way to the centrifugal force, so that it leans by n about its foot in proportion to ω².
+    The foot of the array is compliant: under the centrifugal force the array leans by n about it, in proportion to ω².
     F is the specific force at the chip, r its place from the foot.
 
     Notes
@@ -189,7 +189,7 @@ class LeanByRateSquared(_OfCube):
     :symbols: ν = {x,y}_rad_per_rad2_s2
     :size: 4 mrad at 10 rad/s, by choice.
     :example: x_rad_per_rad2_s2 = 4e-5, y_rad_per_rad2_s2 = -2e-5
-    :experiment: Spin at several speeds, then clamp the foot or brace the top of the array: the lean goes.
+    :experiment: Spin at several speeds, then clamp the foot or brace the top of the array: the lean disappears.
     """
 
     name = "lean_by_rate_squared"
@@ -198,9 +198,9 @@ class LeanByRateSquared(_OfCube):
 
 
 class LeanByRate(_OfCube):
-    """An array that leans one way or the other with the rate.
+    """An array that leans in proportion to the rate, to opposite sides in the two directions.
 
-    The array leans by n in proportion to the rate, the other way in the other direction: the gyroscopic couple of a
+    The array leans by n in proportion to the rate, with the sign of the rate: the gyroscopic torque of a
     part that spins within it, such as a fan.
 
     Notes
@@ -221,7 +221,7 @@ class LeanByRate(_OfCube):
 class LeanByAcceleration(_OfCube):
     """An array that leans when the table accelerates.
 
-    A tall array on a soft foot leans back while the table accelerates.
+    A tall array on a compliant foot leans back while the table accelerates.
 
     Notes
     -----
@@ -230,8 +230,8 @@ class LeanByAcceleration(_OfCube):
     :symbols: ν = {x,y}_rad_per_rad_s2
     :size: 4 mrad at 20 rad/s², by choice.
     :example: x_rad_per_rad_s2 = 2e-4, y_rad_per_rad_s2 = -1e-4
-    :experiment: Make slow and fast ramps between the same two speeds: the lean is there during the ramps alone and in
-        proportion to their steepness.
+    :experiment: Make slow and fast ramps between the same two speeds: the lean occurs during the ramps alone, in
+        proportion to the acceleration.
     """
 
     name = "lean_by_acceleration"
@@ -240,7 +240,7 @@ class LeanByAcceleration(_OfCube):
 
 
 class LeanByTurns(_OfCube):
-    """An array that a cable leans as it winds up.
+    """An array that is pulled over by a cable as it winds up.
 
     A cable that winds up pulls the array over, in proportion to the angle turned since the start.
 
@@ -251,8 +251,8 @@ class LeanByTurns(_OfCube):
     :symbols: ν = {x,y}_rad_per_rad
     :size: 4 mrad after 20 rad, by choice.
     :example: x_rad_per_rad = 2e-4, y_rad_per_rad = -1e-4
-    :experiment: Turn some revolutions one way, rest, and turn back: the lean comes back with the angle. Replace the
-        cable by a battery and a logger.
+    :experiment: Turn some revolutions one way, rest, and turn back: the lean follows the angle. Replace the
+        cable by a battery and a logger: the lean disappears.
     """
 
     name = "lean_by_turns"

@@ -184,7 +184,7 @@ class WheelTable(Table, frozen=True, tag_field="kind", tag="wheel"):
     shake_m_s2: Annotated[
         NotNegative, about("Rms acceleration of the hub up and down, and along x besides rolling.", "m/s²")
     ] = Wheel.shake
-    shake_hz: Annotated[Positive, about("About the highest frequency of it.", "Hz")] = Wheel.shake_frequency
+    shake_hz: Annotated[Positive, about("Highest frequency of it, approximately.", "Hz")] = Wheel.shake_frequency
     seed: Annotated[int, about("Seed of the ground.")] = Wheel.seed
     start_rate_rad_s: Annotated[float, about("Rate before the first piece.", "rad/s")] = 0.0
     start_angle_rad: _StartAngle = 0.0

@@ -19,10 +19,10 @@ class MotorTable(Table, frozen=True):
             "A controller of angle and rate that commands torque; or a voltage proportional to the rate, no feedback."
         ),
     ] = "servo"
-    stiffness_Nm_rad: Annotated[NotNegative, about("Of the servo, torque per error of the angle.", "N·m/rad")] = (
+    stiffness_Nm_rad: Annotated[NotNegative, about("Torque of the servo per error of the angle.", "N·m/rad")] = (
         DcMotor.stiffness
     )
-    damping_Nms_rad: Annotated[NotNegative, about("Of the servo, torque per error of the rate.", "N·m·s/rad")] = (
+    damping_Nms_rad: Annotated[NotNegative, about("Torque of the servo per error of the rate.", "N·m·s/rad")] = (
         DcMotor.damping
     )
     resistance_ohm: Annotated[Positive, about("Resistance of the winding.", "Ω")] = DcMotor.resistance
@@ -33,7 +33,7 @@ class MotorTable(Table, frozen=True):
         DcMotor.constant
     )
     supply_V: Annotated[Positive, about("Largest voltage.", "V")] = DcMotor.supply
-    torque_limit_Nm: Annotated[Positive, about("Largest torque of the current.", "N·m")] = DcMotor.torque_limit
+    torque_limit_Nm: Annotated[Positive, about("Largest torque of the motor.", "N·m")] = DcMotor.torque_limit
     rotor_inertia_kgm2: Annotated[NotNegative, about("Inertia of the rotor.", "kg·m²")] = DcMotor.rotor_inertia
     cogging_Nm: Annotated[NotNegative, about("Amplitude of the cogging torque.", "N·m")] = DcMotor.cogging
     cogging_periods: Annotated[
@@ -42,7 +42,7 @@ class MotorTable(Table, frozen=True):
     cogging_phase_rad: Annotated[float, about("Phase of the cogging at the angle zero.", "rad")] = DcMotor.cogging_phase
     coulomb_Nm: Annotated[Positive, about("Friction torque of sliding.", "N·m")] = DcMotor.coulomb
     static_Nm: Annotated[Positive, about("Friction torque of breaking away.", "N·m")] = DcMotor.static
-    stribeck_rad_s: Annotated[Positive, about("Rate at which the one becomes the other.", "rad/s")] = (
+    stribeck_rad_s: Annotated[Positive, about("Rate scale of the change from breaking away to sliding.", "rad/s")] = (
         DcMotor.stribeck_rate
     )
     bristle_stiffness_Nm_rad: Annotated[

@@ -38,7 +38,7 @@ class PlanFile(Table, frozen=True):
         dict[str, Annotated[list[Value], msgspec.Meta(min_length=1)] | RangeTable],
         about("Factors by name: a list of values, or a table with low and high.", example={"scenario": ["paper_run"]}),
     ]
-    kind: Annotated[str, about("What a case does: estimate, diagnose, measure or drive.")] = "estimate"
+    kind: Annotated[str, about("Task of a case: estimate, diagnose, measure or drive.")] = "estimate"
     design: Annotated[
         Literal["grid", "random", "latin_hypercube", "sobol", "saltelli"],
         about(
@@ -51,7 +51,7 @@ class PlanFile(Table, frozen=True):
         about("Combinations of a design that is no grid; a power of two for sobol and saltelli."),
     ] = None
     repeats: Annotated[int, about("Seeds per combination.", ge=1)] = 1
-    seed: Annotated[int, about("Seed of everything left to chance.", ge=0)] = 0
+    seed: Annotated[int, about("Seed of all random numbers.", ge=0)] = 0
     batch: Annotated[int, about("Cases that are run and written together.", ge=1)] = 20
 
 

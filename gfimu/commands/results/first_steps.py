@@ -72,7 +72,7 @@ class DemoResult(Result, kw_only=True):
 class Demo(Result, kw_only=True):
     """The paper's experiment in simulation."""
 
-    seed: Annotated[int, about("Seed of everything left to chance.")]
+    seed: Annotated[int, about("Seed of all random numbers.")]
     results: Annotated[list[DemoResult], about("The table, line by line.")]
     files: Files
 

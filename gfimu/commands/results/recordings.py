@@ -190,7 +190,7 @@ class Simulated(Result, kw_only=True):
     """A simulated recording."""
 
     scenario: Annotated[str, about("Name of the scenario.")]
-    seed: Annotated[int, about("Seed of everything left to chance.")]
+    seed: Annotated[int, about("Seed of all random numbers.")]
     samples: Annotated[int, about("Samples.")]
     duration_s: Annotated[Number, about("Length.", "s")]
     sample_rate_hz: Annotated[Number, about("Sample rate.", "Hz")]

@@ -23,7 +23,7 @@ SEPARATED = 12.0
 
 @dataclass(frozen=True)
 class Proposal:
-    """The experiment to do next.
+    """A proposed experiment: the profile or mounting that best separates effects.
 
     Parameters
     ----------

@@ -85,7 +85,7 @@ class EffectView:
 
 @dataclass(frozen=True)
 class RunCheck(PlottedResult):
-    """What recordings can show.
+    """Quality of recordings, and the effects that their motion can show and separate.
 
     Parameters
     ----------

@@ -34,7 +34,7 @@ FORMAT_VERSION = 1  # numerical: of verdict.json, no threshold
 
 @dataclass(frozen=True)
 class NamedCause:
-    """One cause that the diagnosis names.
+    """One cause in a verdict: an effect with its sizes, their standard deviations and a probability.
 
     Parameters
     ----------

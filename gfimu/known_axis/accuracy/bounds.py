@@ -28,7 +28,7 @@ __all__ = ["AxisBounds", "axis_bounds", "require_visible"]
 
 @dataclass(frozen=True)
 class AxisBounds(PlottedResult):
-    """Bounds on a rotation about one axis.
+    """Lower bounds on the errors of rate and angle for rotation about one known axis.
 
     Parameters
     ----------

@@ -49,7 +49,7 @@ class AxisDriftTerm:
 
 @dataclass(frozen=True)
 class AxisDrift(PlottedResult):
-    """Drift about a known axis.
+    """Growth of the errors of rate and angle about a known axis.
 
     Parameters
     ----------
