@@ -29,11 +29,17 @@ class TableColumns:
     ------
     InputError
         If it is no such table, has a column without a name, or repeats one.
+
+    Attributes
+    ----------
+    time_remedy : str
+        How to make the column ``t_s`` of a pandas table whose index is the time; empty for other tables.
     """
 
     def __init__(self, source: Any) -> None:
         kind = type(source)
-        self.file = f"{kind.__module__.partition('.')[0]} {kind.__name__}"
+        self.file = f"{kind.__module__.partition('.')[0]} {kind.__name__}".removeprefix("builtins ")
+        self.time_remedy = ""
         self._column: Callable[[str], Any]
         self._found: Callable[[str], NDArray[Any]]
         if hasattr(source, "attrs") and hasattr(source, "reset_index"):
@@ -42,8 +48,8 @@ class TableColumns:
             self._open_arrow(source)
         else:
             raise InputError(
-                f"{self.file}: neither a path nor a table; give a .csv or .parquet file, or a table of pandas, polars "
-                "or pyarrow"
+                f"{self.file}: neither a path nor a table; give a .csv or .parquet file, a table of pandas, polars "
+                "or pyarrow, or times and readings, (t, a)"
             )
 
     @classmethod
@@ -56,6 +62,7 @@ class TableColumns:
     def _open_pandas(self, table: Any) -> None:
         if table.index.name == "t_s" and "t_s" not in table.columns:
             table = table.reset_index()
+        self.time_remedy = _time_remedy(table)
         self.names: list[str] = self._checked(list(table.columns))
         self.max_rows: int = len(table)
         self.metadata: dict[str, Any] = {str(key): value for key, value in table.attrs.items()}
@@ -120,7 +127,8 @@ class TableColumns:
         if pa.types.is_null(kind):
             return np.full(len(column), np.nan)
         if not (pa.types.is_floating(kind) or pa.types.is_integer(kind)):
-            raise InputError(f"{self.file}: column {name} holds {kind}, not numbers; write it as numbers")
+            wanted = "give seconds since the first sample" if pa.types.is_temporal(kind) else "write it as numbers"
+            raise InputError(f"{self.file}: column {name} holds {kind}, not numbers; {wanted}")
         return numbers(column)
 
     def _no_number(self, name: str) -> InputError:
@@ -132,6 +140,14 @@ class TableColumns:
                     "leave the cell empty where a value is missing"
                 )
         return InputError(f"{self.file}: column {name} holds values that are no numbers; write it as numbers")
+
+
+def _time_remedy(table: Any) -> str:
+    """Return how the index of a pandas table becomes the sample time; empty where it is a plain count of rows."""
+    kind = table.index.dtype.kind
+    if kind in "mM":
+        return 'the index holds times: table["t_s"] = (table.index - table.index[0]).total_seconds()'
+    return 'the index holds numbers; if they are seconds: table.index.name = "t_s"' if kind == "f" else ""
 
 
 def _as_found(column: pa.ChunkedArray) -> NDArray[Any]:

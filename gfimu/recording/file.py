@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from gfimu.errors import CorruptValueWarning, InputError, UnitError
 from gfimu.files.column_file import ColumnFile, open_columns
 from gfimu.files.table import ArrowStream
+from gfimu.files.table_columns import TableColumns
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.parts.part import Part
 from gfimu.parts.plausible import MOST_CORRUPT, largest_of_array, largest_of_part, largest_reference
@@ -83,7 +84,11 @@ def read_recording_file(
     table = open_columns(path)
     if "t_s" not in table.names:
         _refuse_other_time_unit(table)
-        raise InputError(f"{table.file}: column t_s is missing; every recording needs the sample time in seconds")
+        remedy = table.time_remedy if isinstance(table, TableColumns) else ""
+        raise InputError(
+            f"{table.file}: column t_s is missing; every recording needs the sample time in seconds"
+            + (f"; {remedy}" if remedy else "")
+        )
     references = _reference_columns(table)
     channels = _channel_columns(table, array, _own_array(table), unit, needs_channels=needs_channels)
     known = {"t_s", *(column.source for column in (*channels, *references))}
@@ -204,11 +209,7 @@ def _channel_columns(
     if not wanted:
         raise InputError(f"{table.file}: no column holds a reading; name them a11_m_s2 … (or _g, _mg, _lsb)")
     if missing:
-        place = "" if array is None else f" of array {array.name!r}"
-        raise InputError(
-            f"{table.file}: column {', '.join(missing)}{place} is missing; add it (or _g, _mg, _lsb) "
-            "or name the array it was made with"
-        )
+        raise _missing_channels(table, missing, array)
     largest = _largest_readings(table, array or own, wanted) if unit == "m_s2" else [_LARGEST_COUNT] * len(wanted)
     return [
         _Column(
@@ -216,6 +217,24 @@ def _channel_columns(
         )
         for channel, most in zip(wanted, largest, strict=True)
     ]
+
+
+def _missing_channels(table: ColumnFile, missing: Sequence[str], array: AccelerometerArray | None) -> InputError:
+    """Return the error of channels that a table lacks; those without a unit in their name have a remedy of their own."""
+    place = "" if array is None else f" of array {array.name!r}"
+    if len(missing) == 1:
+        found, remedy = f"column {missing[0]}{place} is missing", "add it"
+    else:
+        shown = ", ".join(missing[:3]) + (f" … ({len(missing)})" if len(missing) > 3 else "")
+        found, remedy = f"columns {shown}{place} are missing", "add them"
+    bare = [name for name in (one.removesuffix("_m_s2") for one in missing) if name in table.names]
+    if bare and isinstance(table, TableColumns):
+        remedy = f'{bare[0]} has no unit: gfimu.Recording.from_table(table, array=…, units="m_s2") or "g", "mg", "lsb"'
+    elif bare:
+        remedy = f"{bare[0]} has no unit: name it {bare[0]}_m_s2, or {bare[0]}_g, {bare[0]}_mg, {bare[0]}_lsb"
+    else:
+        remedy += " (or _g, _mg, _lsb) or name the array it was made with"
+    return InputError(f"{table.file}: {found}; {remedy}")
 
 
 def _largest_readings(table: ColumnFile, array: AccelerometerArray | None, channels: Sequence[str]) -> list[float]:

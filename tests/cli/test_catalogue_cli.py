@@ -54,6 +54,12 @@ def test_a_file_to_start_from_can_be_used(gfimu_command, tmp_path, kind):
     assert "is there already" in again.stderr
 
 
+def test_the_array_to_start_from_determines_all_motions(gfimu_command, tmp_path):
+    assert gfimu_command("new", "array", "--out", tmp_path / "my_array.toml").code == 0
+    scored = gfimu_command("score", tmp_path / "my_array.toml", "cube12")
+    assert (scored.code, scored.stderr) == (0, "")
+
+
 def test_a_sender_is_a_folder(gfimu_command, tmp_path):
     readme = gfimu_command("new", "sender").stdout
     assert readme.startswith("# A sender for gfimu")

@@ -131,7 +131,7 @@ def suggest(raw: RawFile, *, table: str = "", name: str = "map", text: TextSpec 
     reasons += [line for part in parts for line in part.reasons]
     roles |= {name: role for part in parts for name, role in part.roles.items()}
     unused = [key for key, values in chosen.columns.items() if key not in roles and values.dtype != object]
-    if not chosen.named and chips and unused:
+    if chips and unused and not (chosen.named and reference):
         reasons.append(
             f"{', '.join(unused[:4])}: not used; a tachometer or an angle goes under [reference], as "
             f'tacho_rad_s = {{ column = "{unused[0]}", unit = "rad/s" }}'

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,6 +20,7 @@ _WEAK = re.compile(r"^a[xyz_\d\[ ]|_a_|^a_", re.IGNORECASE)
 _SINGLE = re.compile(r"a_?\d|a[_ ]?[xyz](?![a-z])", re.IGNORECASE)
 _GYRO = re.compile(r"gyr|omega|angular|^w[xyz_\d\[ ]|^w_|rate|rot|itg", re.IGNORECASE)
 _FREE = re.compile(r"free|lin\w* ?acc|without ?g|user ?acc", re.IGNORECASE)
+_NUMBERED = re.compile(r"(?P<before>.*?)(?P<number>\d+)(?P<after>\D*)")
 _NEITHER = re.compile(
     r"mag(?!nitude)|^m_?[xyz]$|euler|quat|orient|^field[ _]?[xyz]|_field|angle|roll|pitch|yaw|pos|vel_|std|cov|temp|gps"
     r"|^q_?[0-3wxyz]$|mat\[|rotm|dcm|setpoint|motor|axis[pidf]|command|gravity|uncal",
@@ -44,7 +45,7 @@ class Triad:
 
 
 def find_triads(table: RawTable, taken: Sequence[str] = ()) -> list[Triad]:
-    """Return columns whose names differ in x, y, z (or 0, 1, 2 or 1, 2, 3) alone, of acceleration or rate.
+    """Return columns whose names differ in x, y, z (or 0, 1, 2 or 1, 2, 3) alone, or are numbered on, of force or rate.
 
     Where the numbers of one triad are gravity at rest, others count as acceleration only if their names say so.
     """
@@ -53,8 +54,9 @@ def find_triads(table: RawTable, taken: Sequence[str] = ()) -> list[Triad]:
         return _by_gravity(
             table, [(one, False) for run in _runs(table, free.values()) for one in _without_names(table, run)]
         )
-    found: list[tuple[Triad, bool]] = []
-    used: set[str] = set()
+    numbered = _numbered(table, free)
+    found: list[tuple[Triad, bool]] = [(Triad(one, "acceleration"), True) for one in numbered]
+    used: set[str] = {_short(name) for one in numbered for name in one}
     for short, name in free.items():
         for axes in (("x", "y", "z"), ("0", "1", "2"), ("1", "2", "3")):
             for place in (spot for spot, letter in enumerate(short) if letter == axes[0]):
@@ -69,6 +71,32 @@ def find_triads(table: RawTable, taken: Sequence[str] = ()) -> list[Triad]:
                     kind, by_name = _kind(table, columns)
                     found.append((Triad(columns, kind), by_name))
     return _by_gravity(table, found)
+
+
+def _numbered(table: RawTable, free: Mapping[str, str]) -> list[tuple[str, str, str]]:
+    """Return threes of columns whose names are numbered on over several chips, as CH0 … CH11, if all show gravity.
+
+    Parameters
+    ----------
+    table : RawTable
+        The table.
+    free : mapping of str to str
+        Columns by their names without unit, in small letters.
+    """
+    series: dict[tuple[str, str], dict[int, str]] = {}
+    for short, name in free.items():
+        found = _NUMBERED.fullmatch(short)
+        if found and not _NEITHER.search(short):
+            series.setdefault((found["before"], found["after"]), {})[int(found["number"])] = name
+    threes: list[tuple[str, str, str]] = []
+    for columns in series.values():
+        order = sorted(columns)
+        if len(order) < 6 or len(order) % 3 or order != list(range(order[0], order[0] + len(order))):
+            continue
+        groups = [(columns[at], columns[at + 1], columns[at + 2]) for at in order[::3]]
+        if all(_is_gravity(table, one) for one in groups):
+            threes += groups
+    return threes
 
 
 def _known(table: RawTable, name: str) -> NDArray[np.float64]:

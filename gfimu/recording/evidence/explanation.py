@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -127,6 +127,9 @@ def _explaining(tried: Sequence[tuple[Otherwise, Costs]], before: Costs, evidenc
         compared = usable and bool(np.isfinite(after.motion))
         if not _possible(way, before, evidence) or after.worst_rest > _FITS:
             continue
+        if way.array is not None and evidence.has_parity and not evidence.has_parity_of(way.array):
+            # An array without combinations free of motion has no cost of them: its motion has to fit instead.
+            after = replace(after, parity=after.motion if compared else np.inf)
         fits = max(after.parity, after.motion if compared else 0.0, after.level) < _FITS
         if not fits:
             continue

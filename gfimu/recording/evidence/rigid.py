@@ -198,7 +198,11 @@ class Evidence:
     @property
     def has_parity(self) -> bool:
         """Whether enough combinations of the channels are free of all motion."""
-        return len(self._matrices(self.array).parity) >= _LEAST_PARITY
+        return self.has_parity_of(self.array)
+
+    def has_parity_of(self, array: AccelerometerArray) -> bool:
+        """Whether enough combinations of an array's channels are free of all motion."""
+        return len(self._matrices(array).parity) >= _LEAST_PARITY
 
     def as_given(self) -> Otherwise:
         """Return the file as it says of itself."""

@@ -132,3 +132,29 @@ def _workbook():
     with zipfile.ZipFile(stream, "w") as archive:
         archive.writestr("xl/workbook.xml", "<workbook/>")
     return stream.getvalue()
+
+
+def board_of_numbered_columns(path, *, tilted=1.0):
+    """A file of two chips whose six columns are numbered on; the second one's z axis is scaled by ``tilted``."""
+    t = np.arange(1000) / 100.0
+    noise = np.random.default_rng(3).normal(0.0, 0.003, (len(t), 6))
+    columns = noise + np.array([0.0, 0.0, 1.0, 0.0, 0.0, tilted])
+    return field.rows(path, ["tick," + ",".join(f"CH{k}(g)" for k in range(9, 15)) + ",spd"], [t, *columns.T, 10.0 * np.sin(t)])
+
+
+def test_columns_that_are_numbered_on_over_the_chips_are_all_taken(tmp_path):
+    found = inspect_file(board_of_numbered_columns(tmp_path / "board.csv"))
+    assert found.chips == 2
+    assert {key: one.column for key, one in found.column_map.channels.items()} == {
+        f"a{chip}{axis}": f"CH{5 + 3 * chip + axis}(g)" for chip in (1, 2) for axis in (1, 2, 3)
+    }
+
+
+def test_numbered_columns_without_gravity_in_each_three_are_no_chips(tmp_path):
+    found = inspect_file(board_of_numbered_columns(tmp_path / "board.csv", tilted=0.2))
+    assert found.column_map is None or "a23" not in found.column_map.channels
+
+
+def test_a_column_that_may_be_a_reference_is_pointed_out(tmp_path):
+    reasons = inspect_file(board_of_numbered_columns(tmp_path / "board.csv")).reasons
+    assert any(line.startswith("spd: not used; ") and 'tacho_rad_s = { column = "spd"' in line for line in reasons)

@@ -81,6 +81,19 @@ def world(rng, name="cube12", kind="table", errors="typical"):
     return Recording.from_arrays(t, readings, array, reference=reference, metadata=metadata), array
 
 
+BOARD = """name = "board"
+length_unit_m = 0.05
+""" + "".join(
+    f"""
+[[chip]]
+part = "adxl345"
+position_m = [{x}, {y}, 0.0]
+axes = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+"""
+    for x, y in ((0.04, 0.03), (0.04, -0.03), (-0.04, 0.03), (-0.04, -0.03))
+)
+
+
 def with_columns(run, change):
     readings = run.readings.copy()
     change(readings)
@@ -196,6 +209,27 @@ def test_another_array_is_named(table_run):
     found = check_recording(table_run, built)
     assert [(one.kind, one.refused) for one in found] == [("array", True)]
     assert "--array cube12" in found[0].text
+
+
+@pytest.mark.parametrize(
+    ("change", "cause"),
+    [(scaled([0], -1), "channel a11 is inverted"), (exchanged(0, 4), "channels a11 and a22 are exchanged")],
+)
+def test_an_array_that_nothing_can_contradict_is_no_explanation(tmp_path, change, cause):
+    """The cube has no combination that is free of all motion: it has no residual there, whatever the readings are."""
+    (tmp_path / "board.toml").write_text(BOARD)
+    board = AccelerometerArray.load(tmp_path / "board.toml")
+    t = np.arange(2400) / RATE
+    rate = np.where(t > 4.0, 6.0 * np.sin(0.7 * (t - 4.0)), 0.0)
+    axis = np.array([0.0, 0.0, 1.0])
+    angle = np.cumsum(rate) / RATE
+    up = np.column_stack([0.005 * np.cos(angle), -0.005 * np.sin(angle), np.ones(len(t))])  # the table leans
+    readings = specific_force(board, G * up, np.outer(np.gradient(rate, t), axis), np.outer(rate, axis))
+    run = Recording.from_arrays(t, readings + 0.03 * np.random.default_rng(5).standard_normal(readings.shape), board)
+    assert check_recording(run, board) == ()
+    (found,) = check_recording(with_columns(run, change), board)
+    assert found.refused
+    assert cause in found.text
 
 
 def test_a_rate_other_than_the_stated_one_is_refused(table_run):
