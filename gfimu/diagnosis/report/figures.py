@@ -37,6 +37,7 @@ from gfimu.visual.colours import (
     chip_colour,
     css,
 )
+from gfimu.visual.page import PlotLimits
 from gfimu.visual.rig.figure import array_figure, channel_style
 
 __all__ = [
@@ -54,12 +55,11 @@ __all__ = [
 
 _BEFORE, _AFTER = css(BEFORE_ON_PAPER), css(AFTER_ON_PAPER)
 _NOISE, _INK, _PALE = css(NOISE_ON_PAPER), css(INK), css(PALE)
-_STRONGEST = 4  # channels drawn in colour
+_LIMITS = PlotLimits()
 _MANY = 24  # channels, of more of which pictures are coarser so that the page stays small
 _MOST_POINTS = 4000
 _MOST_FREQUENCIES = 1200
 _DPI, _COARSE_DPI = 110, 55
-_SMOOTH_S = 0.15
 _GRID = "#ededed"  # of `array_figure`
 _STYLE = {
     "font.family": "sans-serif",
@@ -136,7 +136,7 @@ def dependence_figure(dependence: Dependence, array: AccelerometerArray) -> str:
     with mpl.rc_context(_STYLE):
         figure = Figure(figsize=(5.4, 2.3), layout="constrained")
         pair = figure.subplots(1, 2, sharey=True)
-        strongest = list(np.argsort(-dependence.amplitude_before)[:_STRONGEST])
+        strongest = list(np.argsort(-dependence.amplitude_before)[: _LIMITS.coloured])
         many = array.n_channels > _MANY
         for axis, mean, title in zip(pair, (dependence.before, dependence.after), ("before", "after"), strict=True):
             axis.axhline(0.0, color=_NOISE, linewidth=0.6)
@@ -258,7 +258,7 @@ def _trace(axis: Axes, run: RunView, channel: int, floor: float) -> None:
         residual = np.where(run.valid[:, channel], run.measured[:, channel] - prediction[:, channel], np.nan)
         t, shown = _thinned(run.t, residual)
         axis.plot(t, shown, color=colour, linewidth=0.5, alpha=0.3, rasterized=True, zorder=order)
-        mean = _moving_mean(residual, max(round(_SMOOTH_S / period), 1))
+        mean = _moving_mean(residual, max(round(_LIMITS.smooth_s / period), 1))
         t, shown = _thinned(run.t, mean)
         axis.plot(t, shown, color=colour, linewidth=1.1, label=label, rasterized=True, zorder=order + 0.2)
     # Below the frame of the axes (2.5) and side by side in depth: all samples become one picture.

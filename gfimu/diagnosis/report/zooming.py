@@ -13,17 +13,12 @@ from gfimu.diagnosis.criticism.views.residual_spectrum import ResidualSpectrum
 from gfimu.diagnosis.criticism.views.residuals import ResidualSize
 from gfimu.diagnosis.criticism.views.run_view import RunView
 from gfimu.geometry.array import AccelerometerArray
-from gfimu.visual.page import Packed, enveloped
+from gfimu.visual.page import Packed, PlotLimits, enveloped
 from gfimu.visual.plots import broken_at_gaps
 
 __all__ = ["dependence_plot", "residual_plot", "spectrum_plot"]
 
-_MOST_SAMPLES = 900_000  # of all channels together that are stored one by one; of more, the envelopes are
-_MOST_GROUPS = 140_000  # of all channels together: 1.2 MB
-_FINENESS = 8.0  # steps that values are rounded to, in a standard deviation of the noise
-_SMOOTH_S = 0.15
-_SHOWN_FIRST = 3  # channels
-_COLOURED = 4
+_LIMITS = PlotLimits()
 
 
 def residual_plot(run: RunView, size: ResidualSize, array: AccelerometerArray, data: Packed) -> dict[str, Any]:
@@ -45,7 +40,7 @@ def residual_plot(run: RunView, size: ResidualSize, array: AccelerometerArray, d
         Where the columns go.
     """
     count = array.n_channels
-    group = 1 if run.t.size * count <= _MOST_SAMPLES else -(-run.t.size * count // _MOST_GROUPS)
+    group = _LIMITS.group(run.t.size * count)
     period = float(np.median(np.diff(run.t))) if len(run.t) > 1 else 1.0
     masked = np.where(run.valid, run.measured, np.nan)
     before, after = masked - run.before, masked - run.after
@@ -53,7 +48,7 @@ def residual_plot(run: RunView, size: ResidualSize, array: AccelerometerArray, d
     t, drive = _with_breaks(run.t, run.rate[:, None], group)
     for column, name in enumerate(array.channels):
         noise = float(size.floor[column])
-        step = noise / _FINENESS if np.isfinite(noise) and noise > 0 else _largest(before[:, column]) / 2**12
+        step = noise / _LIMITS.fineness if np.isfinite(noise) and noise > 0 else _largest(before[:, column]) / 2**12
         pair = np.column_stack([before[:, column], after[:, column]])
         channels.append(
             {
@@ -70,7 +65,7 @@ def residual_plot(run: RunView, size: ResidualSize, array: AccelerometerArray, d
         "x": {"name": "t", "label": "time, s", "unit": "s", "column": data.add(t, 1e-3 * period, order=2)},
         "unit": "m/s²",
         "grouped": group if group > 1 else 0,
-        "smooth": max(round(_SMOOTH_S / spacing), 1),
+        "smooth": max(round(_LIMITS.smooth_s / spacing), 1),
         "channels": channels,
         "shown": _worst(size),
         "drive": {
@@ -95,7 +90,7 @@ def dependence_plot(dependence: Dependence, array: AccelerometerArray, data: Pac
         },
         "unit": "m/s²",
         "label": "mean residual, m/s²",
-        "strongest": [int(one) for one in np.argsort(-strength, kind="stable")[:_COLOURED]],
+        "strongest": [int(one) for one in np.argsort(-strength, kind="stable")[: _LIMITS.coloured]],
         "bins": len(dependence.centres),  # of each channel, one channel after the other
         "before": data.add(dependence.before.T.ravel(), step),
         "after": data.add(dependence.after.T.ravel(), step),
@@ -161,7 +156,7 @@ def _with_breaks(
 def _worst(size: ResidualSize) -> list[int]:
     """Return the channels that are shown first: those furthest above their noise, in the order of the array."""
     excess = np.nan_to_num(size.before / size.floor, nan=-1.0, posinf=0.0)
-    return sorted(int(one) for one in np.argsort(-excess, kind="stable")[:_SHOWN_FIRST])
+    return sorted(int(one) for one in np.argsort(-excess, kind="stable")[: _LIMITS.shown_first])
 
 
 def _largest(values: NDArray[np.float64]) -> float:

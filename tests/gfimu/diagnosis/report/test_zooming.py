@@ -11,7 +11,7 @@ from made_runs import PERIOD, made_view
 from gfimu.diagnosis.criticism.views.residuals import residual_views
 from gfimu.diagnosis.report import zooming
 from gfimu.geometry.array import AccelerometerArray, Chip
-from gfimu.visual.page import Packed
+from gfimu.visual.page import Packed, PlotLimits
 
 ARRAY = AccelerometerArray(
     "four", (Chip("a1", np.zeros(3), np.eye(3)), Chip("a2", np.array([0.1, 0.0, 0.0]), np.eye(3)[:1]))
@@ -70,8 +70,7 @@ def test_lost_samples_break_the_lines(view, views):
 
 
 def test_of_a_long_run_every_peak_is_stored(view, views, monkeypatch):
-    monkeypatch.setattr(zooming, "_MOST_SAMPLES", 1000)
-    monkeypatch.setattr(zooming, "_MOST_GROUPS", 600)
+    monkeypatch.setattr(zooming, "_LIMITS", PlotLimits(most_samples=1000, most_groups=600))
     measured = view.measured.copy()
     measured[1234, 2] += 9.0
     data = Kept()
