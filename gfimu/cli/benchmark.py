@@ -65,7 +65,9 @@ def _worlds(
     sets: SetsOption = None,
     split: SplitOption = "dev",
     limit: LimitOption = None,
-    form: Annotated[Literal["parquet", "csv"], typer.Option("--format", help="Format of the recordings.")] = "parquet",
+    file_type: Annotated[
+        Literal["parquet", "csv"], typer.Option("--file-type", help="Type of the recordings.")
+    ] = "parquet",
     json: JsonOption = False,
 ) -> None:
     """Write worlds as plain files, for a method in any language: a recording and a twin each, no truth.
@@ -74,12 +76,14 @@ def _worlds(
     --------
     gfimu benchmark worlds --out worlds
     # A few, as text
-    gfimu benchmark worlds --out worlds --sets own --limit 5 --format csv
+    gfimu benchmark worlds --out worlds --sets own --limit 5 --file-type csv
     """
     from gfimu.commands.benchmark import worlds
 
     with progress("worlds", total=1.0) as show:
-        found = worlds(out, sets=sets or [], split=split, limit=limit, form=form, progress=_shown("worlds", show))
+        found = worlds(
+            out, sets=sets or [], split=split, limit=limit, file_type=file_type, progress=_shown("worlds", show)
+        )
     if json:
         files = {"worlds": out, "schema": out / "answer.schema.json"}
         print_json({"worlds": [str(folder.relative_to(out)) for folder in found], "files": files})

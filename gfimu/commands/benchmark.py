@@ -151,7 +151,7 @@ def worlds(
     sets: Sequence[str] = (),
     split: str = "dev",
     limit: int | None = None,
-    form: Literal["parquet", "csv"] = "parquet",
+    file_type: Literal["parquet", "csv"] = "parquet",
     progress: Callable[[int, int], None] | None = None,
 ) -> list[Path]:
     """Write worlds as plain files, for a method in any language: a recording and a twin each, no truth.
@@ -166,7 +166,7 @@ def worlds(
         Which worlds.
     limit : int, optional
         Only so many worlds of each set; they stand in a fixed random order.
-    form : {"parquet", "csv"}
+    file_type : {"parquet", "csv"}
         Format of the recordings.
     progress : callable, optional
         Called with the number of worlds that are written and of all.
@@ -190,15 +190,15 @@ def worlds(
     from sim.benchmark.release import cases
     from sim.benchmark.truth_file import task_of
 
-    if form not in ("parquet", "csv"):
-        raise unknown_name("format", form, ("parquet", "csv"))
+    if file_type not in ("parquet", "csv"):
+        raise unknown_name("file type", file_type, ("parquet", "csv"))
     listed = [case.world for name in _chosen(sets) for case in cases(name, split)[:limit]]
     report = progress or (lambda done, total: None)
     folders = []
     for number, world in enumerate(listed):
         task, folder = task_of(world), Path(out) / world
         folder.mkdir(parents=True, exist_ok=True)
-        task.recording.write(folder / f"recording.{form}")
+        task.recording.write(folder / f"recording.{file_type}")
         write_text(folder / "twin.toml", task.twin.to_toml())
         folders.append(folder)
         report(number + 1, len(listed))
@@ -313,6 +313,7 @@ def judge(
     return Judgement(tuple(judged), tuple(summaries(judged)))
 
 
+@writes(reads=("results",))
 def table(results: str | Path | Sequence[str | Path]) -> Judgement:
     """Summarise judged answers of one or several methods: shares with 95 % intervals, points, calibration.
 

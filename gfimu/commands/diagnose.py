@@ -138,8 +138,9 @@ def diagnose(
 
         clocks[0] = join(read[0], reference, reference_map=reference_map, reference_map_set=reference_map_set)
     found, used = _explained(read, clocks, model, reference is not None, kept, labels, report, force)
-    x, y, z = used.mounting_rotvec.tolist()
-    found = replace(found, mounting_rotvec_rad=(x, y, z))
+    if used.mounting_rotvec.any():
+        x, y, z = used.mounting_rotvec.tolist()
+        found = replace(found, mounting_rotvec_rad=(x, y, z))
     if out is not None:
         if report is not None:
             report(0.99, "write the report")

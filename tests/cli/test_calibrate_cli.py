@@ -281,7 +281,7 @@ def test_spin_bad_input(gfimu_command, turned, poses):
 
 
 def test_the_help_lists_every_method(gfimu_command):
-    shown = " ".join(gfimu_command("calibrate", "--help").stdout.replace("│", " ").split())
+    shown = " ".join(gfimu_command("calibrate", "--help").stdout.split()).replace("- ", "-")  # lines break at hyphens
     assert ", ".join(METHODS) in shown
 
 

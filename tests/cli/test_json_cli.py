@@ -62,6 +62,11 @@ CALLS = {
     "campaign status camp": "campaign status",
     "campaign table camp --csv q.csv": "campaign table",
     "campaign plot camp --out q.svg": "campaign plot",
+    "benchmark list": "benchmark list",
+    "benchmark worlds --sets own --limit 1 --out worlds": "benchmark worlds",
+    "benchmark run always_unknown --sets own --limit 1 --out bench": "benchmark run",
+    "benchmark judge bench --partial --out judged_again.jsonl": "benchmark judge",
+    "benchmark table judged.jsonl": "benchmark table",
     "firmware run --scenario rest --duration 0.5 --out fw.csv": "firmware run",
     "firmware selftest": "firmware selftest",
     "firmware trace --duration 0.002 --out trace.vcd": "firmware trace",
@@ -116,6 +121,13 @@ def campaign(here):
     return gfimu.campaign(here / "plan.toml", out=here / "camp", workers=1)
 
 
+@pytest.fixture(scope="module")
+def benchmark(here):
+    """Answers of a method to one world of the benchmark, and what the judge says of them."""
+    gfimu.benchmark.run("always_unknown", out=here / "bench", sets=["own"], limit=1)
+    gfimu.benchmark.judge(here / "bench", out=here / "judged.jsonl", partial=True)
+
+
 def refuse_constant(text):
     raise AssertionError(f"{text} is no JSON")
 
@@ -147,6 +159,8 @@ def test_a_result_is_as_its_schema_says(gfimu_command, here, monkeypatch, reques
         pytest.importorskip("unicorn")
     if line.startswith("campaign"):
         request.getfixturevalue("campaign")
+    if line.startswith("benchmark"):
+        request.getfixturevalue("benchmark")
     monkeypatch.chdir(here)
     result = gfimu_command(*line.split(), "--json")
     assert result.code == 0, result.stderr
