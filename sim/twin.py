@@ -1,4 +1,4 @@
-"""The twin: what the simulation assumes, and its predictions for a recording."""
+"""The twin: assumptions of a simulation about a rig, and its predictions for a recording."""
 
 from __future__ import annotations
 
@@ -182,7 +182,7 @@ class Twin:
         mounting: NDArray[np.float64] | None = None,
         start: float | None = None,
     ) -> World:
-        """Return the world that the twin assumes, with more effects added.
+        """Return the world of the twin with more effects added.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""The twin file: what a simulation assumes of a rig."""
+"""The twin file: assumptions of a simulation about a rig."""
 
 from __future__ import annotations
 

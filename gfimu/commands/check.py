@@ -33,7 +33,7 @@ def check(
     recordings : Recording, path, table, (times, readings), or sequence of these
         Runs of one rig.
     twin : WorldModel, str or Path
-        What the simulation assumes: a twin, its name or file, or a simulation of one's own (``rig.py:function``).
+        The simulation to check: a twin, its name or file, or a simulation of one's own (``rig.py:function``).
     column_map : ColumnMap, str or Path, optional
         What the columns of a foreign file are: a map, its name or TOML file (``--map``).
     map_set : sequence of str

@@ -62,7 +62,7 @@ def diagnose(
     recordings : Recording, path, table, (times, readings), or sequence of these
         Runs of one rig, fitted together.
     twin : WorldModel, str or Path
-        What the simulation assumes: a twin, its name or file; or a simulation of one's own, as such or as
+        The simulation to check: a twin, its name or file; or a simulation of one's own, as such or as
         ``rig.py:function`` (`gfimu.own_rig.load_model`).
     out : str or Path, optional
         Folder for ``verdict.json``, ``twin.toml``, ``report.html`` and ``diagnosis.rrd``; made if it isn't there. A

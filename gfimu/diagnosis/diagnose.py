@@ -43,11 +43,11 @@ def diagnose(
     recordings : sequence of Recording
         One or several runs of the same unit; each may have its own mounting in its metadata.
     model : WorldModel
-        What the simulation assumes.
+        Assumptions of the simulation about the rig.
     held_out : sequence of Recording
         Runs that are kept for the gate and the gain.
     names : sequence of str, optional
-        Names of the runs, for people.
+        Names of the runs, for the report.
     report : callable, optional
         Called with the share done (0 to 1) and a line of text.
     policy : Policy, optional

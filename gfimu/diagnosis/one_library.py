@@ -49,7 +49,7 @@ class LibraryDiagnosis:
     prepared, kept : PreparedRuns
         Runs to explain, and those kept for the gain, if any.
     model : WorldModel
-        What the simulation assumes.
+        Assumptions of the simulation about the rig.
     policy : Policy
         Thresholds.
     report : callable

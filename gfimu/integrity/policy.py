@@ -179,7 +179,7 @@ class MonitorPolicy:
         return max(6, round(self.block_s / period))
 
     def threshold(self, n_channels: int, block_s: float) -> float:
-        """Return the statistic from which a fault is believed: χ²(1) at the stated rate of false alarms."""
+        """Return the statistic from which a fault counts as detected: χ²(1) at the stated rate of false alarms."""
         tests = self.tests_per_channel * n_channels * 3600.0 / block_s
         share = min(0.5, self.false_alarms_per_hour / tests)
         return NormalDist().inv_cdf(0.5 * share) ** 2  # quantile of χ²(1)

@@ -19,7 +19,7 @@ from gfimu.world_model import BasisUnits, SpinState
 __all__ = ["Cause", "Moment", "Parameter", "Presence", "UnnamedCause", "bias_cause", "gain_cause"]
 
 Parameter = Size
-"""A number of a simulation that may differ from what it assumes: key, unit, and the usual difference."""
+"""A parameter of a simulation that may be wrong: key, unit, and the usual size of its error."""
 
 _BIAS = 20e-3 * STANDARD_GRAVITY  # m/s²: of MEMS chips that were not calibrated
 _BIAS_LEFT = 0.3e-3 * STANDARD_GRAVITY  # m/s²: what a good calibration leaves
@@ -39,14 +39,14 @@ class Moment:
 
 @dataclass(frozen=True)
 class Presence:
-    """A cause with values: what a simulation assumes of it, or what a diagnosis found.
+    """A cause with values: those that a simulation assumes, or those that a diagnosis found.
 
     Parameters
     ----------
     cause : Cause or UnnamedCause
         What it is of.
     parameters : dict
-        Differences from what the simulation assumes by key; those that are left out are zero.
+        Differences from the values of the simulation, by key; those that are left out are zero.
     """
 
     cause: Cause | UnnamedCause
@@ -243,7 +243,7 @@ class UnnamedCause:
         return is_of_time(self.dependence)
 
     def __call__(self, parameters: Mapping[str, Any]) -> Presence:
-        """Return the term with its coefficients, which name their function for people and files."""
+        """Return the term with its coefficients, which name their function in reports and files."""
         units = dict(zip(_UNITS, (self.units.rate, self.units.acceleration, self.units.duration), strict=True))
         return Presence(self, {"dependence": self.dependence, **units, **parameters})
 

@@ -40,7 +40,7 @@ class SimulatorModel:
     simulate : callable
         Called as ``simulate(state, t, parameters)`` with the motion ``state.angle`` (rad), ``state.rate`` (rad/s) and
         ``state.acceleration`` (rad/s²), each (n,), the times t (n,), s, and all parameters of all causes by key, zero
-        where the simulation is believed. Returns noise-free readings (n, c), m/s², and the reference (n,): rad/s, or
+        where the simulation is right. Returns noise-free readings (n, c), m/s², and the reference (n,): rad/s, or
         rad where the reference is an angle. It depends on the arguments alone, and smoothly.
     causes : tuple of Cause
         What it may have wrong; `gfimu.own_rig.bias_cause` and `gain_cause` are those that any array has.

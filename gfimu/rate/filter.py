@@ -52,7 +52,7 @@ def filter_rate(
     -------
     RateEstimate
         With an unknown start the whole run of the hypothesis that won; ``sign`` states from when on that was certain.
-        Before the rate first stands clear of the biases it is zero give or take all that they allow.
+        Until the rate exceeds what the biases allow it is zero, with a standard deviation that covers what they allow.
 
     Raises
     ------

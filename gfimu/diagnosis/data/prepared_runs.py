@@ -65,7 +65,7 @@ class PreparedRuns:
         recordings : sequence of Recording
             The runs.
         model : WorldModel
-            What the simulation assumes.
+            Assumptions of the simulation about the rig.
         names : sequence of str
             Names of the runs, for people.
         predict : callable

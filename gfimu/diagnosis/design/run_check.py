@@ -153,7 +153,7 @@ def check_runs(
     recordings : sequence of Recording
         Runs of one rig.
     model : WorldModel
-        What the simulation assumes.
+        Assumptions of the simulation about the rig.
     names : sequence of str
         Names of the runs, for people.
     useful : UsefulRun

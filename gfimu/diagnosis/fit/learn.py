@@ -83,7 +83,7 @@ def _by_reference(stretch: Stretch, spacing: float) -> Drive:
         found = closer.by_reference(times[:, -1], reading, weights[seen], order, _REFERENCE_ROUNDS)
     if not any(effect.place == "reference" for effect in (*stretch.model.effects, *stretch.known)):
         return found
-    # What the twin assumes of its reference is inverted: d = reading - (predicted reading of d - d).
+    # The twin's model of its reference is inverted: d = reading - (predicted reading of d - d).
     for _ in range(_REFERENCE_ROUNDS):
         state = found.spin.at(times[:, -1])
         error = stretch.predict([], found.spin)[seen, -1] - (state.angle if stretch.is_angle else state.rate)

@@ -1,4 +1,4 @@
-"""Whether the library holds the truth: how far a named cause is to be believed when reality may be outside of it.
+"""Whether the library holds the truth: the probability of a named cause when reality may be outside of it.
 
 The probability of a cause by evidence is one among the effects of the library. Free numbers fit much that is not
 in it. What gives a confounded cause away can be seen in the fit: numbers bound by a pattern that nothing should bind,

@@ -35,7 +35,7 @@ class LikelyMistake:
     Parameters
     ----------
     text : str
-        What is wrong, for people.
+        What is wrong, in words.
     before, after : float
         Rms of the misfit without it and with it mended, m/s².
     """

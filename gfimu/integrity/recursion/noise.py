@@ -27,7 +27,7 @@ class BlockNoise:
     block_s : float
         Length of a block, s.
     threshold : float
-        Statistic from which a fault is believed.
+        Statistic from which a fault counts as detected.
     policy : MonitorPolicy
         Memory and margins.
 

@@ -33,7 +33,7 @@ def prepare_bodies(
     recordings : sequence of Recording
         The runs.
     model : BodyModel
-        What the simulation assumes.
+        Assumptions of the simulation about the rig.
     names : sequence of str
         Names of the runs, for people.
     spike_share : float
