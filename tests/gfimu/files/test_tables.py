@@ -193,7 +193,9 @@ def test_an_index_of_times_has_a_remedy_that_works():
 
 def test_missing_channels_are_counted_and_bare_names_have_a_remedy():
     cube = AccelerometerArray.load("cube12")
-    with pytest.raises(InputError, match=r"columns a11_m_s2, a12_m_s2, a13_m_s2 … \(12\) of .* are missing; add them \("):
+    with pytest.raises(
+        InputError, match=r"columns a11_m_s2, a12_m_s2, a13_m_s2 … \(12\) of .* are missing; add them \("
+    ):
         Recording.read(pa.table({"t_s": TWO, "b_m_s2": TWO}), array=cube)
     bare = pa.table({"t_s": TWO, **{name: TWO for name in cube.channels}})
     with pytest.raises(InputError, match=r"are missing; a11 has no unit: gfimu\.Recording\.from_table\("):

@@ -139,7 +139,9 @@ def board_of_numbered_columns(path, *, tilted=1.0):
     t = np.arange(1000) / 100.0
     noise = np.random.default_rng(3).normal(0.0, 0.003, (len(t), 6))
     columns = noise + np.array([0.0, 0.0, 1.0, 0.0, 0.0, tilted])
-    return field.rows(path, ["tick," + ",".join(f"CH{k}(g)" for k in range(9, 15)) + ",spd"], [t, *columns.T, 10.0 * np.sin(t)])
+    return field.rows(
+        path, ["tick," + ",".join(f"CH{k}(g)" for k in range(9, 15)) + ",spd"], [t, *columns.T, 10.0 * np.sin(t)]
+    )
 
 
 def test_columns_that_are_numbered_on_over_the_chips_are_all_taken(tmp_path):
