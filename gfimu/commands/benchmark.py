@@ -300,6 +300,7 @@ def judge(
     return Judgement(tuple(judged), tuple(summaries(judged)))
 
 
+@writes(reads=("results",))
 def table(results: str | Path | Sequence[str | Path]) -> Judgement:
     """Summarise judged answers of one or several methods: shares with 95 % intervals, points, calibration.
 
