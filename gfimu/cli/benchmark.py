@@ -28,7 +28,8 @@ def register(app: typer.Typer) -> None:
     group = CommandApp(
         help="Measure how well a method names what a simulation gets wrong: fixed worlds, a judge, baselines.\n\n"
         "A method is a Python function, or a program in any language that reads the worlds as files and writes its "
-        "answers as lines of JSON.\n\nExamples\n--------\ngfimu benchmark run greedy_bic --out greedy --sets own --limit 2\n"
+        "answers as lines of JSON.\n\nExamples\n--------\n"
+        "gfimu benchmark run greedy_bic --out greedy --sets own --limit 2\n"
         "gfimu benchmark judge greedy --out greedy.jsonl\ngfimu benchmark table greedy.jsonl",
         no_args_is_help=True,
     )

@@ -77,7 +77,8 @@ def _sections(command: Any, ctx: Any) -> dict[str, list[tuple[str, str]]]:
     for param in command.get_params(ctx):
         record = param.get_help_record(ctx)
         if record is not None:
-            record = (_with_plain_types(record[0]), record[1])
+            name = _with_plain_types(record[0])
+            record = (name.replace(" FILE", " FOLDER") if record[1].startswith("Folder") else name, record[1])
             argument = param.param_type_name == "argument"
             title = "Arguments" if argument else getattr(param, "rich_help_panel", None) or "Options"
             sections.setdefault(title, []).append(record)

@@ -30,7 +30,8 @@ def inspect(file: str | Path, *, table: str = "", out: str | Path | None = None)
     Raises
     ------
     InputError
-        If the file can't be read, or holds no accelerations that a map to write could name.
+        If the file can't be read, is a stream of a MIMU4444, which needs no map, or holds no accelerations that a map
+        to write could name.
 
     Examples
     --------
@@ -39,7 +40,12 @@ def inspect(file: str | Path, *, table: str = "", out: str | Path | None = None)
     """
     from gfimu.files.atomic_file import write_text
     from gfimu.importing import inspect_file
+    from gfimu.recording.mimu4444 import is_mimu4444
 
+    if is_mimu4444(file):
+        raise InputError(
+            f"{file}: a MIMU4444 stream, which needs no column map; gfimu convert {file} run.parquet reads it"
+        )
     found = inspect_file(file, table=table)
     if out is not None:
         if found.column_map is None:

@@ -69,7 +69,7 @@ def integrate_rate_recursively(
     if reached < len(times):
         raise InputError(
             f"the rate diverges {times[reached] - times[0]:.3g} s after the start, because this array's alpha depends "
-            "on omega²; check the order and signs of the columns and the unit of t_s; else use a shorter run, less biased "
+            "on omega²; check order and signs of the columns and the unit of t_s; else use a shorter run, less biased "
             "readings, or an array that allows form 'joint'"
         )
     omega[valid] = found

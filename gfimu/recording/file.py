@@ -220,7 +220,7 @@ def _channel_columns(
 
 
 def _missing_channels(table: ColumnFile, missing: Sequence[str], array: AccelerometerArray | None) -> InputError:
-    """Return the error of channels that a table lacks; those without a unit in their name have a remedy of their own."""
+    """Return the error of channels that a table lacks; names without a unit have a remedy of their own."""
     place = "" if array is None else f" of array {array.name!r}"
     if len(missing) == 1:
         found, remedy = f"column {missing[0]}{place} is missing", "add it"

@@ -214,7 +214,9 @@ def recording_noise(
     else:
         rest = detect_rest(recording, threshold=rest_threshold)
         if len(rest) == 0:
-            raise InputError("no rest found; noise shows only while nothing moves: record at rest, or use all samples")
+            raise InputError(
+                "no rest found; noise shows only while nothing moves: record at rest, or use all samples, --stretch all"
+            )
         longest = int(np.argmax(rest.lengths))
         start, stop = int(rest.start[longest]), int(rest.stop[longest])
     part = recording.slice(start, stop)

@@ -153,6 +153,9 @@ def test_convert_and_estimate_a_mimu4444_stream(gfimu_command, tmp_path):
         packets.append(body + struct.pack(">H", sum(body) % 65536))
     stream = tmp_path / "stream.bin.gz"
     stream.write_bytes(gzip.compress(bytes.fromhex("A02800C8") + b"".join(packets)))
+    looked_at = gfimu_command("inspect", stream)
+    assert looked_at.code == 2
+    assert f"a MIMU4444 stream, which needs no column map; gfimu convert {stream}" in looked_at.stderr
     result = gfimu_command("convert", stream, tmp_path / "run.csv", "--json")
     assert json.loads(result.stdout)["packets"] == 100
     for source in (stream, tmp_path / "run.csv"):

@@ -109,6 +109,12 @@ def test_every_usual_word_shows_help(gfimu_command, words):
     assert gfimu_command(*words).code == 0
 
 
+def test_an_option_that_takes_a_folder_says_so(gfimu_command):
+    diagnose, estimate = (gfimu_command(name, "--help").stdout for name in ("diagnose", "estimate"))
+    assert re.search(r"--out FOLDER +Folder to write", diagnose)
+    assert re.search(r"--out FILE +Estimate to write", estimate)
+
+
 def test_help_of_a_command_of_a_command(gfimu_command):
     assert "gfimu campaign table [OPTIONS] DIR" in gfimu_command("help", "campaign", "table").stdout
     assert gfimu_command("help").stdout == gfimu_command("-h").stdout

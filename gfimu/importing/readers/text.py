@@ -104,7 +104,7 @@ def _decoded(data: bytes, source: str) -> str:
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return data.decode("utf-16", errors="replace").replace("\r\n", "\n").replace("\r", "\n")
     if b"\x00" in data[:4096]:
-        raise InputError(f"{source}: a binary file of unknown format; gfimu inspect lists the formats that are known")
+        raise InputError(f"{source}: a binary file of unknown format; gfimu list formats has those that are known")
     try:
         content = data.decode("utf-8-sig")
     except UnicodeDecodeError:

@@ -123,13 +123,14 @@ def _explaining(tried: Sequence[tuple[Otherwise, Costs]], before: Costs, evidenc
         costs.motion < _FITS and max(costs.worst_rest, costs.level, costs.parity) < _FITS for _, costs in tried
     )
     found = []
-    for way, after in tried:
-        compared = usable and bool(np.isfinite(after.motion))
-        if not _possible(way, before, evidence) or after.worst_rest > _FITS:
+    for way, costs in tried:
+        compared = usable and bool(np.isfinite(costs.motion))
+        if not _possible(way, before, evidence) or costs.worst_rest > _FITS:
             continue
+        after = costs
         if way.array is not None and evidence.has_parity and not evidence.has_parity_of(way.array):
             # An array without combinations free of motion has no cost of them: its motion has to fit instead.
-            after = replace(after, parity=after.motion if compared else np.inf)
+            after = replace(costs, parity=costs.motion if compared else np.inf)
         fits = max(after.parity, after.motion if compared else 0.0, after.level) < _FITS
         if not fits:
             continue
