@@ -22,7 +22,7 @@ from sim.scenarios import Scenario, simulate
 from sim.twin import Twin
 from sim.world import World
 
-SCRIPT = Path(__file__).resolve().parents[2] / "docs" / "scripts" / "effect_formulas.py"
+SCRIPT = Path(__file__).resolve().parents[3] / "docs" / "scripts" / "effect_formulas.py"
 SPECIFICATION = importlib.util.spec_from_file_location("effect_formulas", SCRIPT)
 formulas = importlib.util.module_from_spec(SPECIFICATION)
 SPECIFICATION.loader.exec_module(formulas)
