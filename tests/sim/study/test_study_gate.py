@@ -203,7 +203,7 @@ def test_only_a_miss_is_fitted_from_the_truth(tmp_path, monkeypatch, said, verdi
 
 @pytest.mark.parametrize(
     ("source", "words"),
-    [("none.py:hide", "existing file"), ("sim/benchmark/generators/independent_world.py:nobody", "no function")],
+    [("none.py:hide", "no such file"), ("sim/benchmark/generators/independent_world.py:nobody", "unknown function")],
 )
 def test_a_generator_that_is_not_there_is_one_line_before_anything_runs(tmp_path, source, words, capsys):
     assert main(["run", "singles", "--world", source, "--out", str(tmp_path / "run")]) == 2
