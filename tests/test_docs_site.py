@@ -8,7 +8,7 @@ import typer
 
 import gfimu
 
-APART = {"_build", "api", "cli"}  # folders that Sphinx writes
+APART = {"_build", "api", "cli", "paper"}  # folders that Sphinx writes, and the paper, which has a form of its own
 
 
 def toctree(page):

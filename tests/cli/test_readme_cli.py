@@ -7,8 +7,6 @@ import shlex
 
 import pytest
 
-from gfimu import AccelerometerArray
-
 
 def blocks(text: str, language: str) -> list[str]:
     """Fenced blocks of a page in one language; a bare fence is the language ''."""
@@ -45,7 +43,6 @@ def test_links_lead_to_files_and_headings(project_root):
 
 def test_the_readmes_commands_run(readme, gfimu_command, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "my_array.toml").write_text(AccelerometerArray.load("corners8").to_toml(), encoding="utf-8")
     commands = [line for block in blocks(readme, "") for line in block.splitlines() if line.startswith("gfimu ")]
     assert len(commands) >= 5
     for line in commands:
