@@ -32,7 +32,7 @@ PART = re.compile(
     re.DOTALL | re.MULTILINE,
 )
 NUMBER = re.compile(r"[-−+]?\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?")
-TIME = re.compile(r"\b(?:done in|took) [\d.]+ (?:s|min)\b")
+TIME = re.compile(r"\b(?:done in|took) [\d.]+ (?:s|min)\b|(?<=│ processor s)[ │\d.]+")
 
 
 def pages() -> list[Path]:

@@ -6,7 +6,6 @@ import contextlib
 import importlib
 import json
 import os
-import signal
 import sys
 import tempfile
 import traceback
@@ -93,7 +92,7 @@ def main() -> None:
         except KeyboardInterrupt:
             code = report.stopped(stop)
         except BaseException as error:  # noqa: BLE001  some libraries' own exceptions are no Exception
-            code = report.stopped(stop) if stop.received == signal.SIGTERM else report.failed(error)
+            code = report.stopped(stop) if stop.is_cause_of(error) else report.failed(error)
     raise SystemExit(code or 0)
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from typing import Annotated
 
 import typer
 
 from gfimu.cli.axis_options import AxisOption, AxisPointOption, HubOption, InclinationOption
 from gfimu.cli.shared_options import ForceOption, JsonOption, shared
+from gfimu.cli.stop_signals import write_line
 
 __all__ = ["register"]
 
@@ -78,5 +78,4 @@ def _live(
         keep_faulty=keep_faulty,
         force=force,
     ):
-        sys.stdout.write(line + "\n")
-        sys.stdout.flush()
+        write_line(line)

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import os
+import select
 import signal
 import sys
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import FrameType
 
-__all__ = ["INTERRUPTED", "Stop", "stop_signals"]
+__all__ = ["INTERRUPTED", "Stop", "stop_signals", "write_line"]
 
 INTERRUPTED = 128 + signal.SIGINT
 """Exit code after Ctrl-C, as shells have it."""
@@ -33,6 +34,13 @@ class Stop:
         if number == signal.SIGTERM:  # no KeyboardInterrupt, by which a search reports what it has found so far
             raise SystemExit(self.code)
         raise KeyboardInterrupt
+
+    def is_cause_of(self, error: BaseException) -> bool:
+        """Whether the program ends with this error because of the signal."""
+        if self.received == signal.SIGTERM:
+            return True
+        # Compiled code that a signal interrupts returns with its exception set, for which Python has this error.
+        return self.received is not None and isinstance(error, SystemError)
 
     @property
     def words(self) -> str:
@@ -61,3 +69,22 @@ def stop_signals() -> Iterator[Stop]:
     finally:
         for number, handler in zip(numbers, before, strict=True):
             signal.signal(number, handler)
+
+
+def write_line(line: str) -> None:
+    """Write a line to standard output, whole even if a signal comes meanwhile: that is taken afterwards.
+
+    A reader that does not read holds up the wait for room, which a signal ends, and not the write.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        sys.stdout.write(f"{line}\n")
+        sys.stdout.flush()
+        return
+    with suppress(ValueError, OSError):  # of what is no file of the system, as in tests
+        select.select([], [sys.stdout], [])  # a pipe then takes 4096 bytes without waiting
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
+    try:
+        sys.stdout.write(f"{line}\n")
+        sys.stdout.flush()
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)

@@ -185,7 +185,7 @@ def test_raw_counts(gfimu_command, tmp_path, poses, run):
         ),
         (("array", "POSES", "--parameters", 9), "twelve-position, not array"),
         (("array", "POSES", "--input", "raw"), "twelve-position, not array"),
-        (("array", "POSES", "--array", "mimu4444"), "column m11"),
+        (("array", "POSES", "--array", "mimu4444"), "columns m11"),
         (("multi-position", "missing.csv"), "missing.csv"),
     ],
 )

@@ -74,6 +74,7 @@ _STYLE = {
     "xtick.color": _INK,
     "ytick.color": _INK,
     "legend.frameon": False,
+    "axes.grid": False,  # whatever style the caller has set
 }
 
 
