@@ -28,7 +28,7 @@ from sim.study.report import Tally, visible
 FOLDER = Path(__file__).resolve().parents[1] / "accuracy"
 PAGE, SPEEDS, OUTCOMES = FOLDER / "measured.md", FOLDER / "speed.json", FOLDER / "diagnosis-study.jsonl.xz"
 OWN, OTHER, PROGRAMMED = "sim.campaign", "tests/independent_world.py:hide", "tests/independent_profiles.py:hide"
-TOLD = "mujoco.sysid, told"
+NAME_GIVEN = "mujoco.sysid, told"  # its name in the stored outcomes
 CASES = {
     ("singles", OWN): "one effect, d′ 15 to 6000",
     ("singles", OTHER): "the same in the independent simulator",
@@ -94,7 +94,7 @@ def baseline_table(outcomes: list[Mapping[str, Any]]) -> str:
         tally = Tally(group)
         z = tally.z()
         covered = f"{np.mean(z < 1.96):.0%} of {len(z)}" if len(z) else "–"
-        named = ("given", "–") if method == TOLD else (tally.share("exact"), tally.share("wrong"))
+        named = ("given", "–") if method == NAME_GIVEN else (tally.share("exact"), tally.share("wrong"))
         rows.append(f"| {method.removesuffix(', told')} | {len(tally)} | {' | '.join(named)} | {covered} |")
     return "\n".join(rows)
 

@@ -96,12 +96,6 @@ class Judgement:
     judged: tuple[Judged, ...]
     summaries: tuple[Summary, ...]
 
-    def to_markdown(self) -> str:
-        """Return the summaries as a table in Markdown."""
-        from sim.benchmark.table import markdown
-
-        return markdown(self.summaries)
-
     def to_dict(self) -> dict[str, Any]:
         """Return the content for JSON."""
         return {
