@@ -65,7 +65,7 @@ def _carried_state(world: World, spin: SpinState) -> BodyState:
     attitude = (rail * Rotation.from_rotvec(world.mount_rotvec)).as_matrix()
     place, speed, push = (np.outer(part, along) for part in (spin.angle, spin.rate, spin.acceleration))
     still = np.zeros_like(place)
-    turned = np.broadcast_to(attitude, (len(place), 3, 3))
+    turned = np.tile(attitude, (len(place), 1, 1))  # SciPy 1.15 takes no read-only rotations
     return BodyState(place + rail.apply(world.cube_offset), turned, speed, push, still, still)
 
 

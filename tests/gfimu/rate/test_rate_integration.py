@@ -49,7 +49,8 @@ def test_weights_are_the_textbook_ones(method, weights, first):
 @settings(max_examples=25, deadline=None)
 @given(data=st.data())
 def test_exact_for_polynomials_on_jittered_times(method, data):
-    steps = np.array(data.draw(st.lists(st.floats(0.8, 1.2), min_size=8, max_size=20)))
+    # Steps within a factor of 1.5 of any median: none of them counts as a gap.
+    steps = np.array(data.draw(st.lists(st.floats(0.85, 1.15), min_size=8, max_size=20)))
     degree = DEGREE[method]
     coefficients = np.array(data.draw(st.lists(st.floats(-1, 1), min_size=degree + 1, max_size=degree + 1)))
     t = np.concatenate([[0.0], np.cumsum(steps)])
