@@ -48,8 +48,6 @@ napoleon_use_rtype = False
 python_use_unqualified_type_names = True
 toc_object_entries_show_parents = "hide"
 
-smartquotes_action = "qe"  # quotes and ellipses, but no dashes: ``--option`` stays as it is
-
 html_theme = "furo"
 html_title = f"gfimu {version}"
 html_static_path = ["_static"]

@@ -6,6 +6,8 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
+from make_cli_reference import escape
+
 from sim.benchmark.judge import Judged
 from sim.benchmark.judged_file import read_judged
 from sim.benchmark.release import SETS, cases
@@ -35,7 +37,7 @@ def sets_table(judged: Sequence[Judged]) -> str:
     for info in SETS.values():
         count = sum(one.set_name == info.name and one.method == OWN for one in judged)
         listed = len(cases(info.name, "test"))
-        rows.append(f"| {info.name} | {info.about} | {info.licence} | {listed} | {count} |")
+        rows.append(f"| {info.name} | {escape(info.about)} | {info.licence} | {listed} | {count} |")
     return "\n".join(rows) + f"\n\nHash of the release: `{release_hash()}`.\n"
 
 
