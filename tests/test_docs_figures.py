@@ -10,15 +10,18 @@ import numpy as np
 import pytest
 
 
-@pytest.fixture(scope="module")
-def script(project_root):
-    specification = importlib.util.spec_from_file_location(
-        "make_figures", project_root / "docs" / "scripts" / "make_figures.py"
-    )
+def loaded(project_root, name):
+    path = project_root / "docs" / "scripts" / f"{name}.py"
+    specification = importlib.util.spec_from_file_location(name, path)
     module = importlib.util.module_from_spec(specification)
     sys.modules[specification.name] = module  # dataclasses look their module up
     specification.loader.exec_module(module)
     return module
+
+
+@pytest.fixture(scope="module")
+def script(project_root):
+    return loaded(project_root, "make_figures")
 
 
 @pytest.fixture(scope="module")
@@ -46,9 +49,30 @@ def test_the_pages_show_exactly_these_figures(drawn, project_root):
     for page in ("cases/paper_experiment.md", "theory/drift.md"):
         shown |= set(re.findall(r"\(\.\./figures/(\S+?)\)", (project_root / "docs" / page).read_text()))
     assert shown == names
-    for path in drawn:  # the stored ones are of the same size: nobody forgot to draw them again after a change
-        stored = project_root / "docs" / "figures" / path.name
-        assert struct.unpack(">II", stored.read_bytes()[16:24]) == struct.unpack(">II", path.read_bytes()[16:24])
+    for path in drawn:
+        same_size(path, project_root / "docs" / "figures" / path.name)
+
+
+def same_size(drawn, stored):
+    """The stored picture is of the drawn one's size: nobody forgot to draw it again after a change."""
+    assert struct.unpack(">II", stored.read_bytes()[16:24]) == struct.unpack(">II", drawn.read_bytes()[16:24])
+
+
+@pytest.mark.parametrize(
+    ("name", "page"),
+    [
+        ("make_bench_figure", "how_to/bench.md"),
+        ("make_motor_figure", "how_to/rigs.md"),
+        pytest.param("make_design_figure", "how_to/design.md", marks=pytest.mark.study),
+    ],
+)
+def test_a_figure_of_one_page_is_drawn(project_root, tmp_path, capsys, name, page):
+    path = loaded(project_root, name).main(tmp_path)
+    text = (project_root / "docs" / page).read_text(encoding="utf-8")
+    assert f"figures/{path.name})" in text
+    same_size(path, project_root / "docs" / "figures" / path.name)
+    for rate, ripple in re.findall(r"(\d+) rad/s: ([\d.]+) mrad/s", capsys.readouterr().out):
+        assert re.search(rf"{float(ripple):.1f} (?:mrad/s )?at {rate} rad/s", text)
 
 
 def test_what_the_page_says_of_the_run(experiment, script):

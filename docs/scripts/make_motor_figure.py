@@ -51,6 +51,7 @@ def main(folder: Path) -> Path:
     ripple.legend()
     path = folder / "motor_run.png"
     figure.savefig(path)
+    plt.close(figure)
     return path
 
 
