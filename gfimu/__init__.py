@@ -125,9 +125,9 @@ if TYPE_CHECKING:
     from gfimu.motion.earth import EarthRotation as EarthRotation
     from gfimu.motion.equivalent_errors import equivalent_p_bias as equivalent_p_bias
     from gfimu.motion.equivalent_errors import equivalent_rate_drift as equivalent_rate_drift
+    from gfimu.motion.estimate import Estimate as Estimate
     from gfimu.motion.estimate_summary import centripetal_agreement as centripetal_agreement
     from gfimu.motion.estimate_summary import summarise as summarise
-    from gfimu.motion.estimation import Estimate as Estimate
     from gfimu.motion.navigation import level as level
     from gfimu.motion.navigation import navigate as navigate
     from gfimu.motion.rest_bias import estimate_from_rest as estimate_from_rest
@@ -178,7 +178,7 @@ _PUBLIC = {
     "EarthRotation": "gfimu.motion.earth",
     "EquivalentErrors": "gfimu.commands.drift",
     "ErrorSources": "gfimu.position_drift.closed_forms",
-    "Estimate": "gfimu.motion.estimation",
+    "Estimate": "gfimu.motion.estimate",
     "Front": "gfimu.array_search.front",
     "GeometryError": "gfimu.errors",
     "GfimuError": "gfimu.errors",

@@ -263,6 +263,7 @@ ROOMS = {
     },
     "gfimu.crash": {
         "gfimu.geometry",
+        "gfimu.motion.estimate",
         "gfimu.motion.estimation",
         "gfimu.parts.limits",
         "gfimu.recording",

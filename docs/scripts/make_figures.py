@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 
 from gfimu import AccelerometerArray, Recording
 from gfimu.motion.attitude import to_rotation
-from gfimu.motion.estimation import Estimate
+from gfimu.motion.estimate import Estimate
 from gfimu.motion.navigation import navigate
 from gfimu.motion.rest_bias import estimate_from_rest
 from gfimu.position_drift import TILT_LIMIT, ErrorSources, drift_budget, equivalent_rate_drift

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from gfimu.bounds.sample import alpha_std, rate_bound_isotropic, steady_rate_bound
 from gfimu.geometry.array import AccelerometerArray
-from gfimu.motion.estimation import Estimate
+from gfimu.motion.estimate import Estimate
 from gfimu.motion.rest_bias import estimate_from_rest, rest_bias
 from gfimu.parts.part import white_noise_std
 from gfimu.position_drift import ErrorSources, drift_budget, equivalent_rate_drift

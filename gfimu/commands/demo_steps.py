@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from gfimu.motion.estimation import Estimate
+    from gfimu.motion.estimate import Estimate
     from gfimu.motion.rest_bias import RestBias
     from gfimu.position_drift.monte_carlo import DriftSample
     from gfimu.recording import Recording

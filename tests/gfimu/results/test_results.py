@@ -9,7 +9,7 @@ import pytest
 
 import gfimu
 from gfimu.errors import GfimuError
-from gfimu.motion.estimation import Estimate
+from gfimu.motion.estimate import Estimate
 from gfimu.results import Panel, PlottedResult, Series, TableResult, result_html, text_column
 from gfimu.results.figure import drawn
 from gfimu.results.html import MOST_ROWS
