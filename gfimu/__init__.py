@@ -94,8 +94,8 @@ if TYPE_CHECKING:
     from gfimu.crash.event import Impact as Impact
     from gfimu.diagnosis.design.proposal import Proposal as Proposal
     from gfimu.diagnosis.design.run_check import RunCheck as RunCheck
+    from gfimu.diagnosis.verdict.parts import NamedCause as NamedCause
     from gfimu.diagnosis.verdict.verdict import Diagnosis as Diagnosis
-    from gfimu.diagnosis.verdict.verdict import NamedCause as NamedCause
     from gfimu.errors import CorruptValueWarning as CorruptValueWarning
     from gfimu.errors import GeometryError as GeometryError
     from gfimu.errors import GfimuError as GfimuError
@@ -189,7 +189,7 @@ _PUBLIC = {
     "LiveRateFilter": "gfimu.rate.live",
     "MappedFile": "gfimu.recording.mapped",
     "MissingPackageError": "gfimu.errors",
-    "NamedCause": "gfimu.diagnosis.verdict.verdict",
+    "NamedCause": "gfimu.diagnosis.verdict.parts",
     "NoiseModel": "gfimu.sensor_noise.identification",
     "Proposal": "gfimu.diagnosis.design.proposal",
     "RateEstimate": "gfimu.rate.result",

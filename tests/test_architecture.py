@@ -87,6 +87,29 @@ def test_the_functions_under_the_commands_print_nothing():
     )
 
 
+BELOW = {module for module in FILES if inside(module, "gfimu") and not inside(module, "gfimu.cli", "gfimu.commands")}
+"""Modules of gfimu below its commands."""
+
+
+def names_imported_below() -> dict[str, set[str]]:
+    return {one: set(imported_names(ast.parse(FILES[one].read_text(encoding="utf-8")))) for one in BELOW - {"gfimu"}}
+
+
+def test_below_the_commands_the_package_itself_is_asked_for_its_version_only():
+    asked = {
+        module: names
+        for module, imported in names_imported_below().items()
+        if (names := {one for one in imported if one.rpartition(".")[0] in {"", "gfimu"} and inside(one, "gfimu")})
+        and not names <= {"gfimu.__version__", *FILES} - {"gfimu"}
+    }
+    assert asked == {}
+
+
+def test_only_methods_of_results_hand_themselves_to_a_command_above():
+    found = {one for one, names in names_imported_below().items() if "gfimu.lazy_names.command_above" in names}
+    assert found == {"gfimu.results.result", "gfimu.diagnosis.verdict.verdict"}
+
+
 def test_neither_the_world_nor_the_wire_imports_the_commands():
     assert not offences(
         lambda module: inside(module, "sim", "firmware_bridge"), lambda name: inside(name, "gfimu.commands")
@@ -378,9 +401,9 @@ BESIDE = {"gfimu.diagnosis.policy", "gfimu.generic_basis", "gfimu.geometry.array
 OUTSIDE = {
     "data": {"gfimu.recording", "gfimu.motion.body_drive"},
     "terms": {"gfimu.motion.body_drive"},
-    "criticism": {"gfimu.geometry.kinematics"},
+    "criticism": {"gfimu.geometry.kinematics", "gfimu.motion.attitude"},
     "design": {"gfimu.recording", "gfimu.importing.oddities"},
-    "verdict": {"gfimu.motion.attitude", "gfimu.files.model_files"},
+    "verdict": {"gfimu.files.model_files"},
     "report": {"gfimu.recording", "gfimu.visual", "gfimu.geometry.turning_axis"},
 }
 """What of this project a single room of the diagnosis may import besides."""

@@ -25,7 +25,8 @@ from gfimu.diagnosis.verdict.conclude import Described, conclude, is_dominant, i
 from gfimu.diagnosis.verdict.gate import impossible_sizes, judge, measurable
 from gfimu.diagnosis.verdict.library import LibraryEvidence, with_library
 from gfimu.diagnosis.verdict.naming import conflicting
-from gfimu.diagnosis.verdict.verdict import Diagnosis, NamedCause
+from gfimu.diagnosis.verdict.parts import NamedCause
+from gfimu.diagnosis.verdict.verdict import Diagnosis
 from gfimu.world_model import WorldModel, is_of_one_recording
 
 __all__ = ["LibraryDiagnosis", "Report", "stretches_of"]

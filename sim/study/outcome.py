@@ -13,7 +13,8 @@ import numpy as np
 from gfimu.diagnosis.design.distinguishability import energy_left, normal_equations, plan_contenders
 from gfimu.diagnosis.design.planned_run import PlannedRun, planned
 from gfimu.diagnosis.verdict.library import standing_out
-from gfimu.diagnosis.verdict.verdict import Diagnosis, NamedCause
+from gfimu.diagnosis.verdict.parts import NamedCause
+from gfimu.diagnosis.verdict.verdict import Diagnosis
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.plugins import function_of_file
 from gfimu.recording import Recording

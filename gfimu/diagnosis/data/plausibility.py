@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import label
 
-from gfimu.diagnosis.data.integrity import SIGNIFICANT_RMS
+from gfimu.diagnosis.data.faults.wiring import SIGNIFICANT_RMS
 from gfimu.diagnosis.data.run import REFERENCE_COLUMNS, Run
 from gfimu.errors import InputError
 from gfimu.units import REFERENCE_UNITS, STANDARD_GRAVITY

@@ -29,7 +29,8 @@ from gfimu.diagnosis.report.plain_words import (
 )
 from gfimu.diagnosis.report.rig import DrawnRig
 from gfimu.diagnosis.report.zooming import dependence_plot, residual_plot, spectrum_plot
-from gfimu.diagnosis.verdict.verdict import Diagnosis, NamedCause
+from gfimu.diagnosis.verdict.parts import NamedCause
+from gfimu.diagnosis.verdict.verdict import Diagnosis
 from gfimu.diagnosis.verdict.wording import SAME_SHARE
 from gfimu.files.atomic_file import write_text
 from gfimu.geometry.array import AccelerometerArray

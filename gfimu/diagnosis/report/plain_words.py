@@ -10,7 +10,8 @@ import numpy as np
 
 from gfimu.diagnosis.criticism.views.run_view import RunView
 from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.verdict.verdict import Diagnosis, NamedCause
+from gfimu.diagnosis.verdict.parts import NamedCause
+from gfimu.diagnosis.verdict.verdict import Diagnosis
 from gfimu.units import NAME, NUMBER, RATIO, STANDARD_GRAVITY, key_name
 
 __all__ = [

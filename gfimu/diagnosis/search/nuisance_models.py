@@ -21,7 +21,8 @@ from gfimu.diagnosis.fit.learn import learn_noise
 from gfimu.diagnosis.fit.linear import Point, linearise, with_residue
 from gfimu.diagnosis.fit.random_walk import Walk, walk_strength
 from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.search.explain import Explanation, Sets, exactly, explain, hardly_eases, prune
+from gfimu.diagnosis.search.explain import Explanation, exactly, explain
+from gfimu.diagnosis.search.sets import Sets, hardly_eases, prune
 from gfimu.diagnosis.terms.jacobian import Jacobian
 from gfimu.diagnosis.terms.residue import Residue
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.verdict.verdict import NamedCause, Residual
+from gfimu.diagnosis.verdict.parts import NamedCause, Residual
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.world_model import EffectFamily, bound_of
 

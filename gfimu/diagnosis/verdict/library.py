@@ -14,7 +14,8 @@ import numpy as np
 from scipy.special import expit
 
 from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.verdict.verdict import Diagnosis, NamedCause
+from gfimu.diagnosis.verdict.parts import NamedCause
+from gfimu.diagnosis.verdict.verdict import Diagnosis
 
 __all__ = [
     "LibraryEvidence",

@@ -9,7 +9,7 @@ import numpy as np
 
 from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.verdict.verdict import NamedCause, Residual, Unexplained
+from gfimu.diagnosis.verdict.parts import NamedCause, Residual, Unexplained
 from gfimu.units import STANDARD_GRAVITY
 
 __all__ = ["SAME_SHARE", "Notes", "verdict_sentences"]

@@ -14,7 +14,7 @@ from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.report.page import report_html
 from gfimu.diagnosis.report.plain_words import headline
 from gfimu.diagnosis.verdict.naming import capped
-from gfimu.diagnosis.verdict.verdict import NamedCause
+from gfimu.diagnosis.verdict.parts import NamedCause
 from gfimu.diagnosis.verdict.wording import verdict_sentences
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray

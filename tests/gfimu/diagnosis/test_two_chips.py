@@ -20,7 +20,7 @@ from gfimu.diagnosis.terms.hand.learning import first_noise
 from gfimu.diagnosis.terms.hand.noise import Projection
 from gfimu.diagnosis.terms.hand.posterior import condition_hand
 from gfimu.diagnosis.verdict.gate import impossible_sizes, judge
-from gfimu.diagnosis.verdict.verdict import NamedCause, Residual
+from gfimu.diagnosis.verdict.parts import NamedCause, Residual
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray, Chip
 from gfimu.motion.body_drive import BodyDrive

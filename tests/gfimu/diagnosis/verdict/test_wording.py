@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from gfimu.diagnosis.criticism.gain import Gain
-from gfimu.diagnosis.verdict.verdict import NamedCause, Residual, Unexplained
+from gfimu.diagnosis.verdict.parts import NamedCause, Residual, Unexplained
 from gfimu.diagnosis.verdict.wording import Notes, verdict_sentences
 
 FALLS = Residual(0.3, 0.1, 0.1, {}, {})
