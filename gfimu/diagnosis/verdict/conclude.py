@@ -276,7 +276,7 @@ def conclude(
         rest=left.signature if left.log_odds > policy.lack_odds else "",
     )
     words = verdict_sentences(verdict, causes, residual, gain, unexplained, withdrawn, notes)
-    others = rival_list(explanation, policy)
+    weaker = rival_list(explanation, policy)
     # Of a table those of the causes alone: it could have many others, each with something that it does not show.
     looked_at = None if policy.free_body else {cause.effect for cause in causes}
     open_ones = undetermined(explanation.screening, array, policy.least_share, looked_at)
@@ -284,7 +284,7 @@ def conclude(
     if of_time:
         words = (*words, _of_absolute_time(of_time))
     listed = tuple(one.to_dict() for one in open_ones)
-    return Diagnosis(verdict, causes, residual, gain, unexplained, others, twin, runs, words, noise, listed)
+    return Diagnosis(verdict, causes, residual, gain, unexplained, weaker, twin, runs, words, noise, listed)
 
 
 def _believed(explanation: Explanation, described: Described | None, *, unknown: bool) -> Fit:
