@@ -71,10 +71,10 @@ if TYPE_CHECKING:
     from gfimu.commands.diagnose import diagnose as diagnose
     from gfimu.commands.diagnose import write_report as write_report
     from gfimu.commands.drift import Drift as Drift
-    from gfimu.commands.drift import EquivalentErrors as EquivalentErrors
     from gfimu.commands.drift import axis_drift as axis_drift
     from gfimu.commands.drift import drift as drift
-    from gfimu.commands.drift import drift_from_position as drift_from_position
+    from gfimu.commands.drift_from_position import EquivalentErrors as EquivalentErrors
+    from gfimu.commands.drift_from_position import drift_from_position as drift_from_position
     from gfimu.commands.drift_of_rest import drift_of_rest as drift_of_rest
     from gfimu.commands.estimate import estimate as estimate
     from gfimu.commands.impact import impact as impact
@@ -176,7 +176,7 @@ _PUBLIC = {
     "DriftBudget": "gfimu.position_drift.budget",
     "DriftSample": "gfimu.position_drift.monte_carlo",
     "EarthRotation": "gfimu.motion.earth",
-    "EquivalentErrors": "gfimu.commands.drift",
+    "EquivalentErrors": "gfimu.commands.drift_from_position",
     "ErrorSources": "gfimu.position_drift.closed_forms",
     "Estimate": "gfimu.motion.estimate",
     "Front": "gfimu.array_search.front",
@@ -229,7 +229,7 @@ _PUBLIC = {
     "diagnose": "gfimu.commands.diagnose",
     "drift": "gfimu.commands.drift",
     "drift_budget": "gfimu.position_drift",
-    "drift_from_position": "gfimu.commands.drift",
+    "drift_from_position": "gfimu.commands.drift_from_position",
     "drift_of_rest": "gfimu.commands.drift_of_rest",
     "equivalent_p_bias": "gfimu.motion.equivalent_errors",
     "equivalent_rate_drift": "gfimu.motion.equivalent_errors",

@@ -94,7 +94,7 @@ def diagnose_case(case: Case) -> Mapping[str, Any]:
         of excess removed.
     """
     from sim.study.outcome import run_case
-    from sim.study.report import brief
+    from sim.study.tally import brief
 
     outcome = run_case(_study_case(case))
     return {**brief(outcome), "share_of_excess_removed": outcome["share_of_excess_removed"]}
