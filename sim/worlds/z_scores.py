@@ -25,7 +25,7 @@ def z_scores(
     truth : mapping
         True parameters; one that is missing counts as zero, one that is no number is left out.
     """
-    # A nod about the opposite direction with the opposite phase is the same nod.
+    # An axis wobble about the opposite direction with the opposite phase is the same wobble.
     direction, true_direction = (_number(one.get("direction_rad", 0.0)) or 0.0 for one in (estimated, truth))
     opposite = math.pi if math.cos(direction - true_direction) < 0 else 0.0
     scores = {}

@@ -10,7 +10,7 @@ __all__ = ["Gain"]
 
 @dataclass(frozen=True)
 class Gain:
-    """What the extension is worth on data that the fit never saw.
+    """What the extension is worth on validation data.
 
     Parameters
     ----------

@@ -15,7 +15,7 @@ from gfimu.diagnosis.fit.linear import Point, with_residue
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.beam import STARTS, Blocks, grown_sets, leading_sets
 from gfimu.diagnosis.search.screening import Screening, screen
-from gfimu.diagnosis.search.sets import Key, Sets, hardly_eases, prune
+from gfimu.diagnosis.search.sets import Key, Sets, has_stalled, prune
 from gfimu.diagnosis.terms.cause import Cause, effects_of
 from gfimu.diagnosis.terms.drive import Drive
 from gfimu.world_model import memory_of
@@ -79,17 +79,17 @@ def explain(
     report : callable, optional
         Called with the share done and a line of text.
     """
-    tell = report or (lambda share, text: None)
-    tell(0.05, "drive")
+    progress = report or (lambda share, text: None)
+    progress(0.05, "drive")
     if start is not None:
         sets = Sets(stretches, start, policy)
         sets.fit([start, replace(start, causes=())])
-        return _searched(sets, partial(_tell_part, tell, 0, 1))
+        return _searched(sets, partial(_report_part, progress, 0, 1))
     reference = starting_point(stretches, policy.knots)
     starts = _started(stretches, reference, policy)
     found = []
     for number, sets in enumerate(starts):
-        found.append(_searched(sets, partial(_tell_part, tell, number, len(starts))))
+        found.append(_searched(sets, partial(_report_part, progress, number, len(starts))))
         if found[-1].interrupted:
             break
     best = max(found, key=lambda one: one.best.log_posterior)
@@ -101,8 +101,8 @@ def explain(
     )
 
 
-def _tell_part(tell: Report, number: int, count: int, share: float, text: str) -> None:
-    tell(0.1 + 0.8 * (number + share) / count, text)
+def _report_part(progress: Report, number: int, count: int, share: float, text: str) -> None:
+    progress(0.1 + 0.8 * (number + share) / count, text)
 
 
 def _started(stretches: Sequence[Stretch], reference: Point, policy: Policy) -> list[Sets]:
@@ -120,7 +120,7 @@ def _started(stretches: Sequence[Stretch], reference: Point, policy: Policy) -> 
     return [_under(sets, one, [nothing]) for one in ((point,) if closer is point else (closer, point))]
 
 
-def _searched(sets: Sets, tell: Report) -> Explanation:
+def _searched(sets: Sets, progress: Report) -> Explanation:
     """Screen, fit the leaders and learn the nuisances, until the most probable set repeats itself.
 
     An interrupt (Ctrl-C) ends the search with what is known by then.
@@ -128,7 +128,7 @@ def _searched(sets: Sets, tell: Report) -> Explanation:
     policy, fits, seen, last = sets.policy, 0, set[Key](), None
     try:
         for number in range(policy.rounds):
-            tell(number / policy.rounds, _leading(sets.best))
+            progress(number / policy.rounds, _leading(sets.best))
             before = sets.best
             last = (before.key, screen(sets.stretches, before.point))
             _fit_leaders(sets, last[1], before, near=number > 0)
@@ -138,7 +138,7 @@ def _searched(sets: Sets, tell: Report) -> Explanation:
             # While a set still grows its noise is that of the largest: a smaller one would pass for more noise.
             best = sets.best if policy.free_body and sets.best.key not in seen else prune(sets)
             fits += sets.count
-            if number > 0 and (best.key in seen or hardly_eases(sets.stretches, before, best, policy)):
+            if number > 0 and (best.key in seen or has_stalled(sets.stretches, before, best, policy)):
                 break
             seen.add(best.key)
             learnt = _relearned(sets.stretches, best, policy, sharpen=best.key != before.key)

@@ -16,7 +16,7 @@ from gfimu.diagnosis.fit.posterior import remembers_long
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.terms.cause import ALIKE, Cause, effects_of
 
-__all__ = ["Key", "Sets", "excess", "hardly_eases", "prune"]
+__all__ = ["Key", "Sets", "excess", "has_stalled", "prune"]
 
 _FAR = 10.0  # numerical: times `Policy.close`
 Key = frozenset[tuple[str, str]]
@@ -64,14 +64,14 @@ class Sets:
     def _is_worth_it(self, found: Fit) -> bool:
         """Whether a fit is rough, and details of what a mode remembers can matter.
 
-        They can't where the mode eases little of what is left without it, nor where far more than noise is left.
+        They can't where the mode reduces the residual little, nor where the residual is far above the noise.
         """
         if not is_rough(self.stretches, found):
             return False
         array = self.stretches[0].model.array
         short = [cause for cause in found.causes if not remembers_long(effects_of([cause], array, 0))]
         without = self.found.get(_key(short))
-        if without is not None and hardly_eases(self.stretches, without, found, self.policy):
+        if without is not None and has_stalled(self.stretches, without, found, self.policy):
             return False
         nothing = self.found.get(frozenset())
         allowed = self.policy.usual_excess
@@ -123,8 +123,8 @@ def excess(stretches: Sequence[Stretch], found: Fit) -> float:
     return found.objective / sum(stretch.observations for stretch in stretches) - 1.0
 
 
-def hardly_eases(stretches: Sequence[Stretch], before: Fit, after: Fit, policy: Policy) -> bool:
-    """Whether a fit leaves far more than noise, and hardly less than another: more of the same leads nowhere.
+def has_stalled(stretches: Sequence[Stretch], before: Fit, after: Fit, policy: Policy) -> bool:
+    """Whether a search has stalled: a fit leaves far more than noise, and little less than the one before it.
 
     Of a body in the hand every cause may be a small share of what real chips disagree about.
     """
@@ -147,7 +147,7 @@ def _posterior(found: Fit) -> float:
 
 
 def prune(sets: Sets) -> Fit:
-    """Return the most probable set, without causes that the data hardly ask for.
+    """Return the most probable set, without causes that the data support too weakly.
 
     A cause whose model is known to be inexact leaves a share of what it explains: others must bring more than that.
     """

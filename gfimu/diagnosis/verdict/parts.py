@@ -158,7 +158,7 @@ class Unexplained:
     surrogate : mapping of str to float
         Data-driven terms: coefficients by what they are of, with its unit, and function: ``"a11_m_s2: rate²"``.
     extends_twin : bool
-        Whether such terms are in the extended twin, as they predict data that their fit never saw.
+        Whether such terms are in the extended twin, as they predict validation data.
     left_out : int
         How many of the terms are not in it, as they are of absolute time, which another recording has otherwise.
     mistake : str

@@ -127,7 +127,7 @@ class Diagnosis(RunResult):
         if np.isfinite(gain.share_of_excess_removed):
             std = f" ± {100 * gain.share_std:.2g} %" if np.isfinite(gain.share_std) else ""
             facts.append(
-                (f"removed on unseen data ({gain.held_out})", f"{100 * gain.share_of_excess_removed:.3g} %{std}")
+                (f"removed on validation data ({gain.held_out})", f"{100 * gain.share_of_excess_removed:.3g} %{std}")
             )
         if np.isfinite(self.library_probability):
             facts.append(("probability that the library holds the cause", f"{100 * self.library_probability:.3g} %"))

@@ -17,7 +17,7 @@ from gfimu.diagnosis.fit.learn import starting_point
 from gfimu.diagnosis.fit.posterior import condition
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.explain import explain, reduced
-from gfimu.diagnosis.search.sets import Sets, excess, hardly_eases, prune
+from gfimu.diagnosis.search.sets import Sets, excess, has_stalled, prune
 from gfimu.geometry.array import AccelerometerArray
 from sim.effects import EFFECTS
 from sim.effects.base import Effect, Size
@@ -193,4 +193,4 @@ def test_more_of_the_same_leads_nowhere_where_much_is_left_and_hardly_less(befor
     stretches = [SimpleNamespace(observations=600), SimpleNamespace(observations=400)]
     fits = [SimpleNamespace(objective=1000.0 * value) for value in (before, after)]
     assert excess(stretches, fits[1]) == pytest.approx(after - 1.0)
-    assert hardly_eases(stretches, *fits, replace(Policy(), free_body=free_body)) == hardly
+    assert has_stalled(stretches, *fits, replace(Policy(), free_body=free_body)) == hardly
