@@ -402,7 +402,7 @@ OUTSIDE = {
     "data": {"gfimu.recording", "gfimu.motion.body_drive"},
     "terms": {"gfimu.motion.body_drive"},
     "criticism": {"gfimu.geometry.kinematics", "gfimu.motion.attitude"},
-    "design": {"gfimu.recording", "gfimu.importing.oddities"},
+    "design": {"gfimu.recording", "gfimu.importing.oddities", "gfimu.geometry.smooth_ramp"},
     "verdict": {"gfimu.files.model_files"},
     "report": {"gfimu.recording", "gfimu.visual", "gfimu.geometry.turning_axis"},
 }

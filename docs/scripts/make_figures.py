@@ -26,7 +26,8 @@ from gfimu.position_drift import TILT_LIMIT, ErrorSources, drift_budget, equival
 from gfimu.position_drift.monte_carlo import monte_carlo_drift
 from gfimu.units import STANDARD_GRAVITY
 from sim.effects import make_effect
-from sim.scenarios import Scenario, simulate
+from sim.scenarios import Scenario
+from sim.simulation import simulate
 
 SEED = 0
 TILT = {"x_rad": 0.015, "y_rad": -0.010}

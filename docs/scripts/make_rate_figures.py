@@ -22,7 +22,8 @@ from gfimu.rate.kalman import FilterSettings
 from gfimu.rate.methods import RATE_METHODS, estimate_rate
 from gfimu.rate.sensing import SensorErrors
 from gfimu.recording import Recording
-from sim.scenarios import Scenario, simulate
+from sim.scenarios import Scenario
+from sim.simulation import simulate
 
 RATE = 100.0
 DRIFT_TIME = 30.0
