@@ -28,8 +28,8 @@ from gfimu.errors import InputError
 from gfimu.geometry.gravity import EARTH_RATE
 from gfimu.rate.integration import integrate_samples
 from gfimu.recording import Recording
-from gfimu.recording.reference_times import reference_on_rows
 from gfimu.recording.rest import detect_rest, mean_variance_factor
+from gfimu.recording.timing.reference_times import reference_on_rows
 from gfimu.units import GYRO_COLUMNS
 
 __all__ = ["Plateaus", "body_axis", "find_plateaus", "rate_table_gyro"]

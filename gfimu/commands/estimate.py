@@ -213,7 +213,7 @@ def estimate_run(
     from gfimu.motion.estimation import estimate as solve
     from gfimu.motion.rest_bias import estimate_from_rest
     from gfimu.recording.carried_array import warn_of_other_array
-    from gfimu.recording.reference_times import reference_on_rows
+    from gfimu.recording.timing.reference_times import reference_on_rows
 
     run, geometry = as_calibrated_run(as_source(recording, array, column_map, map_set), array, calibration)
     if array is not None and calibration is None:

@@ -20,7 +20,7 @@ from gfimu.errors import InputError
 from gfimu.known_axis.axis_gyro import with_axis_gyro
 from gfimu.recording import Recording
 from gfimu.recording.carried_array import warn_of_other_array
-from gfimu.recording.reference_times import reference_on_rows
+from gfimu.recording.timing.reference_times import reference_on_rows
 from gfimu.world_model import WorldModel
 
 __all__ = ["diagnose", "prepare"]

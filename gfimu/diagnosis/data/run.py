@@ -16,8 +16,8 @@ from gfimu.diagnosis.data.rounding import between_steps
 from gfimu.diagnosis.data.time_grid import TimeGrid, time_grid
 from gfimu.errors import InputError
 from gfimu.recording import Recording
-from gfimu.recording.reference_times import reference_times
 from gfimu.recording.timing.conversion_times import output_data_rate
+from gfimu.recording.timing.reference_times import reference_times
 from gfimu.units import TIME_COLUMNS
 from gfimu.world_model import WorldModel
 
