@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 from scipy.special import ndtr
 
-from gfimu.diagnosis.data.run import Run, difference_noise
+from gfimu.diagnosis.data.reference import difference_noise
+from gfimu.diagnosis.data.run import Run
 from gfimu.diagnosis.policy import Policy
 
 __all__ = ["channel_spikes", "frozen_fault", "frozen_stretches", "reference_spikes"]

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.diagnosis.data.faults.rails import GARBAGE, PILE, Rail, find_rails
-from gfimu.diagnosis.data.run import Run, difference_noise
+from gfimu.diagnosis.data.reference import difference_noise
+from gfimu.diagnosis.data.run import Run
 
 __all__ = ["clipping_level", "own_rails"]
 
