@@ -188,11 +188,11 @@ def print_diagnosis(found: Diagnosis) -> None:
         )
     residual, gain = found.residual, found.gain
     error = [("prediction error, rms", f"{residual.rms_before:.3g} m/s²", f"{residual.rms_after:.3g} m/s²")]
-    error += [(f"unseen data: {what}", before, after) for what, before, after in gain_rows(found)]
+    error += [(f"validation data: {what}", before, after) for what, before, after in gain_rows(found)]
     share = percent(gain.share_of_excess_removed)
     note = f"the sensors' own noise: {residual.noise_floor:.3g} m/s²"
     if share != "–":
-        note += f"; on unseen data ({gain.held_out}) {share} of the error beyond noise is gone"
+        note += f"; on validation data ({gain.held_out}) {share} of the error beyond noise is gone"
     print_table("Error before and after", ("", "before", "after"), error, note=note)
     if found.rivals:
         rivals = [(" + ".join(one.effects) or "nothing", one.why, odds(one.log_odds)) for one in found.rivals[:5]]

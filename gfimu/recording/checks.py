@@ -23,8 +23,9 @@ from gfimu.geometry.observability import unseen_motions
 from gfimu.parts.limits import PartLimits
 from gfimu.recording.carried_array import warn_of_other_array
 from gfimu.recording.evidence.explanation import explanations
+from gfimu.recording.evidence.gathering import gather
 from gfimu.recording.evidence.gravity import gravity_text
-from gfimu.recording.evidence.rigid import Evidence, Otherwise, gather
+from gfimu.recording.evidence.rigid import Evidence, Otherwise
 from gfimu.recording.evidence.ways import TIME_UNITS, time_text
 from gfimu.recording.recording import Recording
 

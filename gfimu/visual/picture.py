@@ -12,7 +12,8 @@ from gfimu.files.table import ArrowStream
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.geometry.turning_axis import TurningAxis
 from gfimu.known_axis.estimation import estimate_about_axis
-from gfimu.motion.estimation import Estimate, estimate
+from gfimu.motion.estimate import Estimate
+from gfimu.motion.estimation import estimate
 from gfimu.motion.rest_bias import estimate_from_rest, rest_bias
 from gfimu.recording import Recording
 from gfimu.recording.carried_array import carried_array, warn_of_other_array

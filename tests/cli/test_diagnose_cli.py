@@ -12,7 +12,8 @@ import pytest
 from gfimu import AccelerometerArray, Recording
 from sim.effects import make_effect
 from sim.motions.motion import SplineSpin
-from sim.scenarios import Scenario, simulate
+from sim.scenarios import Scenario
+from sim.simulation import simulate
 from sim.twin import Twin
 from sim.worlds.hidden import Measurement, measure, random_profile
 

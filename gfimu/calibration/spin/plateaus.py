@@ -11,7 +11,7 @@ from scipy.signal import savgol_coeffs, savgol_filter
 from gfimu.calibration.spin.policy import SpinPolicy
 from gfimu.errors import InputError
 from gfimu.recording import Recording
-from gfimu.recording.reference_times import reference_on_rows
+from gfimu.recording.timing.reference_times import reference_on_rows
 
 __all__ = ["Plateaus", "find_plateaus"]
 

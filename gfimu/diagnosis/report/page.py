@@ -29,7 +29,8 @@ from gfimu.diagnosis.report.plain_words import (
 )
 from gfimu.diagnosis.report.rig import DrawnRig
 from gfimu.diagnosis.report.zooming import dependence_plot, residual_plot, spectrum_plot
-from gfimu.diagnosis.verdict.verdict import Diagnosis, NamedCause
+from gfimu.diagnosis.verdict.parts import NamedCause
+from gfimu.diagnosis.verdict.verdict import Diagnosis
 from gfimu.diagnosis.verdict.wording import SAME_SHARE
 from gfimu.files.atomic_file import write_text
 from gfimu.geometry.array import AccelerometerArray
@@ -213,7 +214,7 @@ def _figures_of_merit(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
         merits.append((f"{residual.rms_after:.3g}", "m/s²", "prediction error, extended"))
     merits.append((f"{residual.noise_floor:.3g}", "m/s²", "the sensors' own noise"))
     if np.isfinite(gain.share_of_excess_removed):
-        merits.append((percent(gain.share_of_excess_removed), "", "of the error gone on unseen data"))
+        merits.append((percent(gain.share_of_excess_removed), "", "of the error gone on validation data"))
     if diagnosis.verdict == "explained" and diagnosis.causes:
         merits.append((percent(min(cause.probability for cause in diagnosis.causes)), "", "probability"))
     return merits

@@ -10,7 +10,8 @@ import numpy as np
 
 from gfimu.diagnosis.criticism.views.run_view import RunView
 from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.verdict.verdict import Diagnosis, NamedCause
+from gfimu.diagnosis.verdict.parts import NamedCause
+from gfimu.diagnosis.verdict.verdict import Diagnosis
 from gfimu.units import NAME, NUMBER, RATIO, STANDARD_GRAVITY, key_name
 
 __all__ = [
@@ -159,7 +160,7 @@ def _on_unseen_data(diagnosis: Diagnosis) -> str:
     if not math.isfinite(gain.share_of_excess_removed):
         return ""
     text = (
-        f"On data that the fit never saw ({gain.held_out}), {percent(gain.share_of_excess_removed)} of the error "
+        f"On validation data ({gain.held_out}), {percent(gain.share_of_excess_removed)} of the error "
         "beyond noise is gone. "
     )
     if diagnosis.unexplained.left_out and math.isfinite(gain.share_in_any_recording):
@@ -250,7 +251,7 @@ def next_steps(diagnosis: Diagnosis) -> list[str]:
     if diagnosis.verdict == "explained":
         steps += [_to_be_sure(cause) for cause in diagnosis.causes if cause.not_distinguishable_from]
     if not diagnosis.gain.held_out and diagnosis.verdict != "nothing_found":
-        steps.append("Record a second run: with --held-out its gain is measured on data that the fit never saw.")
+        steps.append("Record a second run: with --held-out its gain is measured on validation data.")
     return [step.strip() for step in steps]
 
 

@@ -16,7 +16,8 @@ from gfimu.recording.checks import check_recording, refuse_or_warn
 from gfimu.recording.formats import open_run
 from gfimu.units import STANDARD_GRAVITY
 from sim.benchmark.generators.independent_world import hide
-from sim.scenarios import Scenario, simulate
+from sim.scenarios import Scenario
+from sim.simulation import simulate
 
 CUBE = AccelerometerArray.load("cube12")
 RATE = 100.0

@@ -1,6 +1,7 @@
 """What every result offers a notebook: HTML, tables, pictures, rerun; by one mechanism."""
 
 import sys
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 
 import gfimu
 from gfimu.errors import GfimuError
-from gfimu.motion.estimation import Estimate
+from gfimu.motion.estimate import Estimate
 from gfimu.results import Panel, PlottedResult, Series, TableResult, result_html, text_column
 from gfimu.results.figure import drawn
 from gfimu.results.html import MOST_ROWS
@@ -131,6 +132,17 @@ def test_uncertainty_is_a_band_of_two_standard_deviations():
     )
     assert (low, high) == (-1.0, 1.0)
     assert [text.get_text() for text in axes.get_legend().get_texts()] == ["x ± 2σ", "y ± 2σ", "z ± 2σ"]
+
+
+def test_dollar_signs_in_names_are_no_formula(tmp_path):
+    values = np.zeros(2)
+    named = Panel("of $\\frac$", "$y_$", (Series("$a_$", values), Series("b", values)), ("$c_$", "$"), "$x_$")
+    lines = Panel("$t_$", "y", (Series("$s_$", values), Series("b", values)), np.arange(2.0))
+    figure = drawn([named, lines])
+    figure.savefig(tmp_path / "named.svg", metadata={"Date": None})
+    cube = gfimu.AccelerometerArray.load("cube12")
+    renamed = replace(cube, name="$n_$", chips=tuple(replace(one, name=f"${one.name}_$") for one in cube.chips))
+    renamed.plot().savefig(tmp_path / "chips.svg")
 
 
 def test_bars_over_names_are_of_two_standard_deviations():

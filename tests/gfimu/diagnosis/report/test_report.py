@@ -17,7 +17,7 @@ from made_diagnoses import made_diagnosis
 from gfimu.diagnosis.report.folder import check_folder, write_diagnosis
 from gfimu.diagnosis.report.page import report_html
 from gfimu.diagnosis.report.plain_words import headline, next_steps, odds, parameter_texts, percent, story
-from gfimu.diagnosis.verdict.verdict import NamedCause
+from gfimu.diagnosis.verdict.parts import NamedCause
 from gfimu.errors import InputError
 
 VERDICTS = ("explained", "ambiguous", "unknown", "nothing_found")
