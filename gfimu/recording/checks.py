@@ -24,6 +24,7 @@ from gfimu.parts.limits import PartLimits
 from gfimu.recording.carried_array import warn_of_other_array
 from gfimu.recording.evidence.explanation import explanations
 from gfimu.recording.evidence.gravity import gravity_text
+from gfimu.recording.evidence.reference_rate import odd_rates
 from gfimu.recording.evidence.rigid import Evidence, Otherwise, gather
 from gfimu.recording.evidence.ways import TIME_UNITS, time_text
 from gfimu.recording.recording import Recording
@@ -53,8 +54,8 @@ class Finding:
     Parameters
     ----------
     kind : str
-        ``time``, ``unit``, ``chip_unit``, ``sign``, ``exchange``, ``duplicate``, ``array``, ``rest_bias``, ``dead``
-        or ``clipped``.
+        ``time``, ``unit``, ``chip_unit``, ``sign``, ``exchange``, ``duplicate``, ``array``, ``reference``,
+        ``rest_bias``, ``dead`` or ``clipped``.
     text : str
         Cause and remedy, one line.
     refused : bool
@@ -230,6 +231,8 @@ def check_recording(recording: Recording, array: AccelerometerArray) -> tuple[Fi
     if not found and unseen_motions(array):  # too few channels to contradict one another
         text, refused = gravity_text(recording, array, limits)
         found += [Finding("unit", text, refused)] if text else []
+    if not found:
+        found += [Finding("reference", one.text, one.certain) for one in odd_rates(recording, array, limits, alive)]
     return (*sorted(found, key=lambda one: not one.refused), *dead)
 
 

@@ -30,7 +30,7 @@ from gfimu.recording.recording import Recording
 from gfimu.recording.rest import detect_rest
 from gfimu.units import STANDARD_GRAVITY
 
-__all__ = ["Costs", "Evidence", "Otherwise", "Window", "gather"]
+__all__ = ["Costs", "Evidence", "Matrices", "Otherwise", "Window", "gather", "product_slopes", "rates_of"]
 
 ALIGNMENT = 0.05  # rad, by which a sensing axis may be off on a real board: "turned by degrees"
 _RESTS = 8  # stretches of rest that are used, the longest
@@ -131,7 +131,7 @@ class Window:
 
 
 @dataclass(frozen=True)
-class _Matrices:
+class Matrices:
     """What an array makes of its readings: α = A y, N y = M s(ω), and P y = 0 for any motion.
 
     ``clean``: whether no products of ω are left in A y; without that the motion is not judged.
@@ -144,7 +144,8 @@ class _Matrices:
     parity: NDArray[np.float64]  # (k, c), orthonormal rows
 
     @classmethod
-    def of(cls, array: AccelerometerArray, alive: NDArray[np.bool_]) -> _Matrices:
+    def of(cls, array: AccelerometerArray, alive: NDArray[np.bool_]) -> Matrices:
+        """Return the matrices of the channels (c,) of an array that are alive."""
         scale = np.array([array.length_unit] * 3 + [1.0] * 3)
         j, q = array.regression_matrix[alive] / scale, array.centripetal_matrix[alive] / array.length_unit
         alpha = np.linalg.pinv(j)[:3] / array.length_unit
@@ -193,7 +194,7 @@ class Evidence:
     up: NDArray[np.float64] | None
     quiet: NDArray[np.float64]
     sample_rate: float
-    _cache: dict[str, _Matrices] = field(default_factory=dict)
+    _cache: dict[str, Matrices] = field(default_factory=dict)
 
     @property
     def has_parity(self) -> bool:
@@ -246,9 +247,9 @@ class Evidence:
             motion, motion_noise = energy / allowed, noise / allowed
         return Costs(rest, level, parity, motion, parity_noise, motion_noise, worst, fitted)
 
-    def _matrices(self, array: AccelerometerArray) -> _Matrices:
+    def _matrices(self, array: AccelerometerArray) -> Matrices:
         if array.name not in self._cache:
-            self._cache[array.name] = _Matrices.of(array, self.alive)
+            self._cache[array.name] = Matrices.of(array, self.alive)
         return self._cache[array.name]
 
     def _allowed(self, spread: NDArray[np.float64]) -> float:
@@ -298,10 +299,10 @@ class Evidence:
         both = np.hstack([axes, centripetal]) / limit[:, None]
         products = np.linalg.lstsq(both, mean / limit, rcond=1e-9)[0][3:]
         best = np.full(len(mean), np.inf)
-        for start in _rates_of(products):
+        for start in rates_of(products):
             omega = start
             for _ in range(_ITERATIONS):
-                slope = np.hstack([axes, centripetal @ _slopes(omega[None])[0]]) / limit[:, None]
+                slope = np.hstack([axes, centripetal @ product_slopes(omega[None])[0]]) / limit[:, None]
                 inside = (mean - centripetal @ omega_products(omega)) / limit
                 step = np.linalg.lstsq(slope, inside, rcond=1e-9)[0]
                 omega = omega + step[3:]
@@ -316,7 +317,7 @@ class Evidence:
         window: Window,
         columns: NDArray[np.float64],
         time: float,
-        matrices: _Matrices,
+        matrices: Matrices,
         further: NDArray[np.float64] | None,
     ) -> tuple[tuple[float, float, float], NDArray[np.float64]]:
         """Return the energy that no rigid motion explains in a window, that of noise, the largest allowed; and the fit.
@@ -335,7 +336,7 @@ class Evidence:
         prior = noise / len(matrices.null) / np.maximum(bias_std, 1e-9) ** 2
         seen = np.linalg.pinv(matrices.sensitivity, rcond=0.05)
         fastest = int(np.argmax(np.sum(z**2, axis=1)))  # where biases matter least
-        rates = _rates_of(seen @ z[:5].mean(axis=0)) + [rate - turned[fastest] for rate in _rates_of(seen @ z[fastest])]
+        rates = rates_of(seen @ z[:5].mean(axis=0)) + [rate - turned[fastest] for rate in rates_of(seen @ z[fastest])]
         energy, fitted = np.inf, np.zeros(6)
         starts = [np.concatenate([rate, np.zeros(3)]) for rate in [np.zeros(3), *rates]]
         for start in starts if further is None else [*starts, further]:
@@ -351,7 +352,7 @@ def _unexplained(
     z: NDArray[np.float64],
     turned: NDArray[np.float64],
     t: NDArray[np.float64],
-    matrices: _Matrices,
+    matrices: Matrices,
     start: NDArray[np.float64],
     prior: NDArray[np.float64],
 ) -> tuple[float, NDArray[np.float64]]:
@@ -389,7 +390,7 @@ def _unexplained(
     return best, kept
 
 
-def _slopes(omega: NDArray[np.float64]) -> NDArray[np.float64]:
+def product_slopes(omega: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the derivatives of the products of ω (m, 3), shape (m, 6, 3)."""
     x, y, z = omega.T
     o = np.zeros_like(x)
@@ -397,7 +398,7 @@ def _slopes(omega: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
-def _rates_of(products: NDArray[np.floating[Any]]) -> list[NDArray[np.float64]]:
+def rates_of(products: NDArray[np.floating[Any]]) -> list[NDArray[np.float64]]:
     """Return the two rates whose products (6,) are nearest to these."""
     xx, yy, zz, xy, xz, yz = products
     values, vectors = np.linalg.eigh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
