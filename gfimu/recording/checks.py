@@ -44,6 +44,7 @@ _LEAST_NOISE = 0.3  # of the data sheet's: from that on a channel surely has noi
 _ALIKE = 1.5  # ratio of the costs of two ways that can't be separated
 _AS_GOOD = 0.05  # of the contradiction is left: as good as nothing, whatever another way leaves
 _RATE_RATIO = 1.5  # between the rate by the times and the metadata's, for a refusal
+_FOLLOWS = 0.5  # correlation of the turning with the tachometer, by which the sign of the turning is sure; by choice
 _SLOWEST = 2.0  # Hz, a rate that is plausible for a moving body
 
 
@@ -327,6 +328,11 @@ def _decide(evidence: Evidence) -> list[Finding]:
     if not found:
         return []
     best = found[0]
+    # A mirrored way fits as well where two chips are each other's mirror image; the sign of the tachometer tells.
+    turned = {id(one): evidence.follows_tacho(one.way) for one in found if one.left < max(_AS_GOOD, _ALIKE * best.left)}
+    if max(turned.values()) > _FOLLOWS:
+        found = [one for one in found if turned.get(id(one), -1.0) > -_FOLLOWS]
+        best = found[0]
     # A whole chip is in another unit more often than one of its axes; one axis alone shows in the noise of the others.
     wider = [one for one in found if one.way.kind == best.way.kind and one.left < max(_AS_GOOD, _ALIKE * best.left)]
     best = max(wider, key=lambda one: len(one.way.channels))
@@ -336,7 +342,7 @@ def _decide(evidence: Evidence) -> list[Finding]:
 
 def _finding(way: Otherwise, alike: Sequence[Otherwise], *, refused: bool) -> Finding:
     text = way.text if refused else f"{way.text} (likely, not certain)"
-    others = [one for one in alike if one.kind == way.kind and one.channels != way.channels][:3]
+    others = [one for one in alike if one.kind == way.kind and one.about != way.about][:3]
     if others and way.channels:
-        text += "; as likely: " + ", or ".join(" and ".join(one.channels) for one in others)
+        text += "; as likely: " + ", or ".join(one.about for one in others)
     return Finding(way.kind, text, refused, way.channels)

@@ -70,6 +70,8 @@ class Otherwise:
         Channels that it is about.
     parts : tuple of Otherwise
         The two ways that it is made of, if it is.
+    brief : str
+        What it is about in a few words, for a list; the channels by default.
     """
 
     kind: str
@@ -79,6 +81,12 @@ class Otherwise:
     array: AccelerometerArray | None = None
     channels: tuple[str, ...] = ()
     parts: tuple[Otherwise, ...] = ()
+    brief: str = ""
+
+    @property
+    def about(self) -> str:
+        """What it is about, in a few words."""
+        return self.brief or " and ".join(self.channels)
 
     def is_one_of(self, kinds: Collection[str]) -> bool:
         """Whether the way, or one of its parts, is of one of these kinds."""
@@ -122,11 +130,15 @@ class Costs:
 
 @dataclass(frozen=True)
 class Window:
-    """Samples of a stretch of motion: readings (m, c), their integrals from its start (m, c), times since (m,), s."""
+    """Samples of a stretch of motion: readings (m, c), their integrals from its start (m, c), times since (m,), s.
+
+    ``tacho`` (m,), rad/s: NaN where there is none.
+    """
 
     readings: NDArray[np.float64]
     integrals: NDArray[np.float64]
     t: NDArray[np.float64]
+    tacho: NDArray[np.float64]
     noise_share: float  # variance of the noise over that of one sample
 
 
@@ -285,6 +297,28 @@ class Evidence:
             else:
                 levels.append(((size - STANDARD_GRAVITY) / free) ** 2)
         return float(np.mean(costs)), float(np.mean(levels)), float(np.max(worst))
+
+    def follows_tacho(self, way: Otherwise) -> float:
+        """Return the correlation of the turning about the upward direction with the tachometer, each without its trend.
+
+        It is negative for a mirrored way to read the file, and 0 where there is no tachometer or no upward direction.
+        """
+        if self.up is None or not self.windows:
+            return 0.0
+        columns = way.columns[np.ix_(self.alive, self.alive)]
+        alpha = self._matrices(way.array or self.array).alpha
+        product = power = other = 0.0
+        for window in self.windows:
+            known = np.isfinite(window.tacho)
+            turned = window.integrals[known] @ columns.T @ alpha.T @ self.up
+            both = np.column_stack([turned, window.tacho[known]])
+            if len(both) < _FEWEST:
+                continue
+            line = np.column_stack([np.ones(len(both)), window.t[known]])
+            both -= line @ np.linalg.lstsq(line, both, rcond=None)[0]
+            squares = both.T @ both
+            product, power, other = product + squares[0, 1], power + squares[0, 0], other + squares[1, 1]
+        return float(product / np.sqrt(power * other)) if power * other > 0.0 else 0.0
 
     def gravity_at_rest(self, way: Otherwise) -> NDArray[np.float64]:
         """Return the size of the specific force of each rest, shape (k,), m/s²."""
@@ -479,12 +513,14 @@ def _windows(
 ) -> tuple[Window, ...]:
     """Return the first stretch of motion, and the one in which the readings vary most."""
     t, values = recording.t_s[whole], readings[whole]
+    tacho = recording.reference.get("tacho_rad_s", np.full(len(whole), np.nan))[whole]
     group = max(1, int(recording.sample_rate // _RATE)) if recording.sample_rate < _NOMINAL_RATES[1] else 1
     count = len(t) // group
     if count < 2 * _FEWEST:
         return ()
     t = t[: count * group].reshape(count, group).mean(axis=1)
     values = values[: count * group].reshape(count, group, -1).mean(axis=1)
+    tacho = tacho[: count * group].reshape(count, group).mean(axis=1)
     length = min(_WINDOW, count)
     starts = np.arange(0, count - length + 1, max(1, length // 4))
     spread = [float(values[start : start + length].var(axis=0).sum()) for start in starts]
@@ -501,7 +537,9 @@ def _windows(
         still = _still(t[part], values[part], edges - start)
         integrals = integrate_samples(t[part], values[part] - still, method="trapezoid")
         rows = np.unique(np.linspace(0, length - 1, min(_ROWS, length)).astype(int))
-        windows.append(Window(values[part][rows], integrals[rows], t[part][rows] - t[start], 1.0 / group))
+        windows.append(
+            Window(values[part][rows], integrals[rows], t[part][rows] - t[start], tacho[part][rows], 1.0 / group)
+        )
     return tuple(windows)
 
 
