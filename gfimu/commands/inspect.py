@@ -30,8 +30,8 @@ def inspect(file: str | Path, *, table: str = "", out: str | Path | None = None)
     Raises
     ------
     InputError
-        If the file can't be read, is a stream of a MIMU4444, which needs no map, or holds no accelerations that a map
-        to write could name.
+        If it is no path, or the file can't be read, is a stream of a MIMU4444, which needs no map, or holds no
+        accelerations that a map to write could name.
 
     Examples
     --------
@@ -42,6 +42,11 @@ def inspect(file: str | Path, *, table: str = "", out: str | Path | None = None)
     from gfimu.importing import inspect_file
     from gfimu.recording.mimu4444 import is_mimu4444
 
+    if not isinstance(file, str | Path):
+        raise InputError(
+            f"inspect needs the path of a file, not a {type(file).__name__}: the columns of a table have names in "
+            "memory; give it to gfimu.Recording.from_table with units=, or write it to a .parquet or .csv file"
+        )
     if is_mimu4444(file):
         raise InputError(
             f"{file}: a MIMU4444 stream, which needs no column map; gfimu convert {file} run.parquet reads it"

@@ -158,6 +158,8 @@ class Block:
         Its shape parameters.
     columns : slice
         Where its columns stand.
+    keys : tuple of str
+        Name of each size.
     places : tuple of ndarray, each of shape (m, k)
         Mixing matrices of the places that its sizes may be confined to.
     """
@@ -165,6 +167,7 @@ class Block:
     family: type[Effect]
     shape: dict[str, float]
     columns: slice
+    keys: tuple[str, ...]
     places: tuple[Floats, ...]
 
 
@@ -245,7 +248,8 @@ class LinearLibrary:
                     columns.append((moved - begun) / _STEP)
                     scale.append(size.prior_std)
                 places = tuple(pattern.mixing for pattern in family.patterns(twin.array))
-                blocks.append(Block(family, shape, slice(first, len(columns)), places))
+                keys = tuple(size.key for size in sizes)
+                blocks.append(Block(family, shape, slice(first, len(columns)), keys, places))
         design, whitened = np.column_stack(columns), (residual / white).ravel()
         if free:
             products = free.products(design, np.nan_to_num(free.measured - begun))

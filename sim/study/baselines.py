@@ -65,7 +65,9 @@ def _greedy_bic(world: HiddenWorld) -> list[dict[str, Any]]:
         chosen.append(library.candidates[best])
     if not chosen:
         return []
-    return _causes(library, {one.effect: one.block for one in chosen}, *library.fit(chosen), dict(world.truth))
+    estimate, covariance = library.fit(chosen)
+    std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    return _causes(library, {one.effect: one.block for one in chosen}, estimate, std, dict(world.truth))
 
 
 def _everything(world: HiddenWorld) -> list[dict[str, Any]]:

@@ -12,7 +12,7 @@ from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.parts.limits import PartLimits
 from gfimu.rate.integration import integrate_samples
-from gfimu.recording.evidence.rigid import Evidence, Window
+from gfimu.recording.evidence.rigid import FEWEST, Evidence, Window
 from gfimu.recording.recording import Recording
 from gfimu.recording.rest import detect_rest
 
@@ -26,7 +26,6 @@ _WINDOW = 2000  # samples of a window of motion, after decimation
 _ROWS = 200  # of them that are compared
 _RATE = 100.0  # Hz, to which faster recordings are averaged
 _NOMINAL_RATES = (4.0, 20_000.0)  # Hz; outside of them rest is looked for as if at 100 Hz
-_FEWEST = 30  # samples
 _TABLE = {"tacho_rad_s", "command_rad_s", "angle_rad"}  # references of a body that turns about one axis only
 
 
@@ -76,7 +75,7 @@ def _rests(
     kept = []
     for rows in found:
         inside = readings[rows][whole[rows]]
-        if len(inside) >= _FEWEST and np.all(
+        if len(inside) >= FEWEST and np.all(
             inside.std(axis=0) < 3.0 * noise + _STILL * np.linalg.norm(inside.mean(axis=0))
         ):
             kept.append(rows)  # a perfect sensor's slowest motion is a rest for `detect_rest` too
@@ -88,19 +87,21 @@ def _windows(
 ) -> tuple[Window, ...]:
     """Return the first stretch of motion, and the one in which the readings vary most."""
     t, values = recording.t_s[whole], readings[whole]
+    tacho = recording.reference.get("tacho_rad_s", np.full(len(whole), np.nan))[whole]
     group = max(1, int(recording.sample_rate // _RATE)) if recording.sample_rate < _NOMINAL_RATES[1] else 1
     count = len(t) // group
-    if count < 2 * _FEWEST:
+    if count < 2 * FEWEST:
         return ()
     t = t[: count * group].reshape(count, group).mean(axis=1)
     values = values[: count * group].reshape(count, group, -1).mean(axis=1)
+    tacho = tacho[: count * group].reshape(count, group).mean(axis=1)
     length = min(_WINDOW, count)
     starts = np.arange(0, count - length + 1, max(1, length // 4))
     spread = [float(values[start : start + length].var(axis=0).sum()) for start in starts]
     after_rest = 0
     if rests:
         last = int(np.count_nonzero(whole[: rests[0].stop])) // group
-        after_rest = max(0, min(last - _FEWEST, count - length))
+        after_rest = max(0, min(last - FEWEST, count - length))
     passed = np.concatenate([[0], np.cumsum(whole)])
     edges = np.array([[passed[rest.start], passed[rest.stop]] for rest in rests]).reshape(-1, 2) // group
     chosen = dict.fromkeys([after_rest, int(starts[int(np.argmax(spread))])])
@@ -110,7 +111,9 @@ def _windows(
         still = _still(t[part], values[part], edges - start)
         integrals = integrate_samples(t[part], values[part] - still, method="trapezoid")
         rows = np.unique(np.linspace(0, length - 1, min(_ROWS, length)).astype(int))
-        windows.append(Window(values[part][rows], integrals[rows], t[part][rows] - t[start], 1.0 / group))
+        windows.append(
+            Window(values[part][rows], integrals[rows], t[part][rows] - t[start], tacho[part][rows], 1.0 / group)
+        )
     return tuple(windows)
 
 

@@ -25,9 +25,10 @@ from gfimu.parts.limits import PartLimits
 from gfimu.recording.evidence.rotation_normal import rotation_normal
 from gfimu.units import STANDARD_GRAVITY
 
-__all__ = ["Costs", "Evidence", "Otherwise", "Window"]
+__all__ = ["FEWEST", "Costs", "Evidence", "Matrices", "Otherwise", "Window", "product_slopes", "rates_of"]
 
 ALIGNMENT = 0.05  # rad, by which a sensing axis may be off on a real board: "turned by degrees"
+FEWEST = 30  # samples of a stretch that is compared
 _LEAST_PARITY = 3  # combinations free of all motion that make the integration of α needless
 _DIAGONAL = np.diag_indices(6)
 _ITERATIONS = 15
@@ -55,6 +56,8 @@ class Otherwise:
         Channels that it is about.
     parts : tuple of Otherwise
         The two ways that it is made of, if it is.
+    brief : str
+        What it is about in a few words, for a list; the channels by default.
     """
 
     kind: str
@@ -64,6 +67,12 @@ class Otherwise:
     array: AccelerometerArray | None = None
     channels: tuple[str, ...] = ()
     parts: tuple[Otherwise, ...] = ()
+    brief: str = ""
+
+    @property
+    def about(self) -> str:
+        """What it is about, in a few words."""
+        return self.brief or " and ".join(self.channels)
 
     def is_one_of(self, kinds: Collection[str]) -> bool:
         """Whether the way, or one of its parts, is of one of these kinds."""
@@ -107,16 +116,20 @@ class Costs:
 
 @dataclass(frozen=True)
 class Window:
-    """Samples of a stretch of motion: readings (m, c), their integrals from its start (m, c), times since (m,), s."""
+    """Samples of a stretch of motion: readings (m, c), their integrals from its start (m, c), times since (m,), s.
+
+    ``tacho`` (m,), rad/s: NaN where there is none.
+    """
 
     readings: NDArray[np.float64]
     integrals: NDArray[np.float64]
     t: NDArray[np.float64]
+    tacho: NDArray[np.float64]
     noise_share: float  # variance of the noise over that of one sample
 
 
 @dataclass(frozen=True)
-class _Matrices:
+class Matrices:
     """What an array makes of its readings: α = A y, N y = M s(ω), and P y = 0 for any motion.
 
     ``clean``: whether no products of ω are left in A y; without that the motion is not judged.
@@ -129,7 +142,8 @@ class _Matrices:
     parity: NDArray[np.float64]  # (k, c), orthonormal rows
 
     @classmethod
-    def of(cls, array: AccelerometerArray, alive: NDArray[np.bool_]) -> _Matrices:
+    def of(cls, array: AccelerometerArray, alive: NDArray[np.bool_]) -> Matrices:
+        """Return the matrices of the channels (c,) of an array that are alive."""
         scale = np.array([array.length_unit] * 3 + [1.0] * 3)
         j, q = array.regression_matrix[alive] / scale, array.centripetal_matrix[alive] / array.length_unit
         alpha = np.linalg.pinv(j)[:3] / array.length_unit
@@ -178,7 +192,7 @@ class Evidence:
     up: NDArray[np.float64] | None
     quiet: NDArray[np.float64]
     sample_rate: float
-    _cache: dict[str, _Matrices] = field(default_factory=dict)
+    _cache: dict[str, Matrices] = field(default_factory=dict)
 
     @property
     def has_parity(self) -> bool:
@@ -231,9 +245,9 @@ class Evidence:
             motion, motion_noise = energy / allowed, noise / allowed
         return Costs(rest, level, parity, motion, parity_noise, motion_noise, worst, fitted)
 
-    def _matrices(self, array: AccelerometerArray) -> _Matrices:
+    def _matrices(self, array: AccelerometerArray) -> Matrices:
         if array.name not in self._cache:
-            self._cache[array.name] = _Matrices.of(array, self.alive)
+            self._cache[array.name] = Matrices.of(array, self.alive)
         return self._cache[array.name]
 
     def _allowed(self, spread: NDArray[np.float64]) -> float:
@@ -270,6 +284,28 @@ class Evidence:
                 levels.append(((size - STANDARD_GRAVITY) / free) ** 2)
         return float(np.mean(costs)), float(np.mean(levels)), float(np.max(worst))
 
+    def follows_tacho(self, way: Otherwise) -> float:
+        """Return the correlation of the turning about the upward direction with the tachometer, each without its trend.
+
+        It is negative for a mirrored way to read the file, and 0 where there is no tachometer or no upward direction.
+        """
+        if self.up is None or not self.windows:
+            return 0.0
+        columns = way.columns[np.ix_(self.alive, self.alive)]
+        alpha = self._matrices(way.array or self.array).alpha
+        product = power = other = 0.0
+        for window in self.windows:
+            known = np.isfinite(window.tacho)
+            turned = window.integrals[known] @ columns.T @ alpha.T @ self.up
+            both = np.column_stack([turned, window.tacho[known]])
+            if len(both) < FEWEST:
+                continue
+            line = np.column_stack([np.ones(len(both)), window.t[known]])
+            both -= line @ np.linalg.lstsq(line, both, rcond=None)[0]
+            squares = both.T @ both
+            product, power, other = product + squares[0, 1], power + squares[0, 0], other + squares[1, 1]
+        return float(product / np.sqrt(power * other)) if power * other > 0.0 else 0.0
+
     def gravity_at_rest(self, way: Otherwise) -> NDArray[np.float64]:
         """Return the size of the specific force of each rest, shape (k,), m/s²."""
         axes = (way.array or self.array).axes[self.alive]
@@ -283,10 +319,10 @@ class Evidence:
         both = np.hstack([axes, centripetal]) / limit[:, None]
         products = np.linalg.lstsq(both, mean / limit, rcond=1e-9)[0][3:]
         best = np.full(len(mean), np.inf)
-        for start in _rates_of(products):
+        for start in rates_of(products):
             omega = start
             for _ in range(_ITERATIONS):
-                slope = np.hstack([axes, centripetal @ _slopes(omega[None])[0]]) / limit[:, None]
+                slope = np.hstack([axes, centripetal @ product_slopes(omega[None])[0]]) / limit[:, None]
                 inside = (mean - centripetal @ omega_products(omega)) / limit
                 step = np.linalg.lstsq(slope, inside, rcond=1e-9)[0]
                 omega = omega + step[3:]
@@ -301,7 +337,7 @@ class Evidence:
         window: Window,
         columns: NDArray[np.float64],
         time: float,
-        matrices: _Matrices,
+        matrices: Matrices,
         further: NDArray[np.float64] | None,
     ) -> tuple[tuple[float, float, float], NDArray[np.float64]]:
         """Return the energy that no rigid motion explains in a window, that of noise, the largest allowed; and the fit.
@@ -320,7 +356,7 @@ class Evidence:
         prior = noise / len(matrices.null) / np.maximum(bias_std, 1e-9) ** 2
         seen = np.linalg.pinv(matrices.sensitivity, rcond=0.05)
         fastest = int(np.argmax(np.sum(z**2, axis=1)))  # where biases matter least
-        rates = _rates_of(seen @ z[:5].mean(axis=0)) + [rate - turned[fastest] for rate in _rates_of(seen @ z[fastest])]
+        rates = rates_of(seen @ z[:5].mean(axis=0)) + [rate - turned[fastest] for rate in rates_of(seen @ z[fastest])]
         energy, fitted = np.inf, np.zeros(6)
         starts = [np.concatenate([rate, np.zeros(3)]) for rate in [np.zeros(3), *rates]]
         for start in starts if further is None else [*starts, further]:
@@ -336,7 +372,7 @@ def _unexplained(
     z: NDArray[np.float64],
     turned: NDArray[np.float64],
     t: NDArray[np.float64],
-    matrices: _Matrices,
+    matrices: Matrices,
     start: NDArray[np.float64],
     prior: NDArray[np.float64],
 ) -> tuple[float, NDArray[np.float64]]:
@@ -374,7 +410,7 @@ def _unexplained(
     return best, kept
 
 
-def _slopes(omega: NDArray[np.float64]) -> NDArray[np.float64]:
+def product_slopes(omega: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the derivatives of the products of ω (m, 3), shape (m, 6, 3)."""
     x, y, z = omega.T
     o = np.zeros_like(x)
@@ -382,7 +418,7 @@ def _slopes(omega: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
-def _rates_of(products: NDArray[np.floating[Any]]) -> list[NDArray[np.float64]]:
+def rates_of(products: NDArray[np.floating[Any]]) -> list[NDArray[np.float64]]:
     """Return the two rates whose products (6,) are nearest to these."""
     xx, yy, zz, xy, xz, yz = products
     values, vectors = np.linalg.eigh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))

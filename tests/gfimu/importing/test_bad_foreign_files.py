@@ -8,6 +8,7 @@ import foreign_files as files
 import numpy as np
 import pytest
 
+import gfimu
 from gfimu.errors import InputError, RecordingWarning, UnitError
 from gfimu.importing import inspect_file, load_map
 from gfimu.importing.oddities import oddities
@@ -190,3 +191,9 @@ def test_times_that_go_back_are_no_counter_that_starts_anew(tmp_path):
     assert inspect_file(text_run(tmp_path, t)).column_map.time.wrap is None
     counts = (65000 + 10 * np.arange(files.N)) % 65536
     assert inspect_file(text_run(tmp_path, counts)).column_map.time.wrap == 65536.0
+
+
+def test_a_table_in_memory_is_refused_with_what_takes_it():
+    table = pytest.importorskip("pandas").DataFrame({"time": [0.0, 0.01], "ax": [0.0, 0.1]})
+    with pytest.raises(InputError, match=r"not a DataFrame: .* gfimu\.Recording\.from_table"):
+        gfimu.inspect(table)
