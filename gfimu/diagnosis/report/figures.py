@@ -5,31 +5,29 @@ from __future__ import annotations
 import base64
 import io
 import re
+import warnings
 import zlib
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_svg import FigureCanvasSVG
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import SymLogNorm
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 from numpy.typing import NDArray
 from PIL import Image
 from scipy.ndimage import uniform_filter1d
 
-from gfimu.diagnosis.criticism.views.dependence import Dependence, Fingerprint
+from gfimu.diagnosis.criticism.views.dependence import Dependence
 from gfimu.diagnosis.criticism.views.residual_spectrum import ResidualSpectrum
 from gfimu.diagnosis.criticism.views.residuals import ResidualSize, Whiteness
 from gfimu.diagnosis.criticism.views.rigid_motion import BandPower
 from gfimu.diagnosis.criticism.views.run_view import RunView
-from gfimu.diagnosis.policy import Policy
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.geometry.turning_axis import TurningAxis
 from gfimu.visual.colours import (
     AFTER_ON_PAPER,
     BEFORE_ON_PAPER,
-    DIVERGING,
     INK,
     NOISE_ON_PAPER,
     PAGE,
@@ -39,13 +37,12 @@ from gfimu.visual.colours import (
 )
 from gfimu.visual.page import PlotLimits
 from gfimu.visual.rig.figure import array_figure, channel_style
+from gfimu.visual.rig.words import short_name
 
 __all__ = [
-    "bars_figure",
     "channels_figure",
     "dependence_figure",
-    "fingerprint_figure",
-    "rig_figure",
+    "rig_figures",
     "rigid_figure",
     "spectrum_figure",
     "themed",
@@ -60,6 +57,7 @@ _MANY = 24  # channels, of more of which pictures are coarser so that the page s
 _MOST_POINTS = 4000
 _MOST_FREQUENCIES = 1200
 _DPI, _COARSE_DPI = 110, 55
+_VIEW = (4.4, 2.4)  # inches: letters are legible where a view is as narrow as a telephone
 _GRID = "#ededed"  # of `array_figure`
 _STYLE = {
     "font.family": "sans-serif",
@@ -93,14 +91,6 @@ def trace_figure(run: RunView, size: ResidualSize) -> str:
         return _svg(figure)
 
 
-def bars_figure(size: ResidualSize) -> str:
-    """Draw the rms of the residual of every channel, before and after, beside its noise."""
-    with mpl.rc_context(_STYLE):
-        figure = Figure(figsize=(11.0, 2.3), layout="constrained")
-        _bars(figure.subplots(), size)
-        return _svg(figure)
-
-
 def channels_figure(run: RunView, size: ResidualSize, array: AccelerometerArray) -> str:
     """Draw the residual of every channel over time on one scale."""
     count = len(size.channels)
@@ -115,7 +105,11 @@ def channels_figure(run: RunView, size: ResidualSize, array: AccelerometerArray)
                 continue
             _trace(axis, run, channel, size.floor[channel])
             axis.set_title(
-                size.channels[channel], loc="left", fontsize=9, pad=2, color=channel_style(array, channel)[0]
+                short_name(size.channels[channel]),
+                loc="left",
+                fontsize=9,
+                pad=2,
+                color=channel_style(array, channel)[0],
             )
         for axis in axes[:, 0]:
             axis.set_ylabel("m/s²")
@@ -124,18 +118,22 @@ def channels_figure(run: RunView, size: ResidualSize, array: AccelerometerArray)
         return _svg(figure, _DPI if count <= _MANY else _COARSE_DPI)
 
 
-def rig_figure(
+def rig_figures(
     array: AccelerometerArray, axis: TurningAxis | None, gravity: NDArray[np.float64] | None, gravity_name: str
-) -> str:
-    """Draw the array with its chips, sensing axes, gravity and axis of rotation; see `array_figure`."""
+) -> tuple[str, str]:
+    """Draw the array with its chips, sensing axes, gravity and axis of rotation, from the side and from above."""
     with mpl.rc_context(_STYLE):
-        return _svg(array_figure(array, axis=axis, gravity=gravity, gravity_name=gravity_name))
+        side, above = (
+            _svg(array_figure(array, axis=axis, gravity=gravity, gravity_name=gravity_name, views=(view,)))
+            for view in ("side", "above")
+        )
+    return side, above
 
 
 def dependence_figure(dependence: Dependence, array: AccelerometerArray) -> str:
     """Draw the mean residual over one quantity, before and after, the four strongest channels in colour."""
     with mpl.rc_context(_STYLE):
-        figure = Figure(figsize=(5.4, 2.3), layout="constrained")
+        figure = Figure(figsize=_VIEW, layout="constrained")
         pair = figure.subplots(1, 2, sharey=True)
         strongest = list(np.argsort(-dependence.amplitude_before)[: _LIMITS.coloured])
         many = array.n_channels > _MANY
@@ -154,19 +152,22 @@ def dependence_figure(dependence: Dependence, array: AccelerometerArray) -> str:
                     color=colour,
                     linestyle=line,
                     linewidth=1.3,
-                    label=array.channels[channel],
+                    label=short_name(array.channels[channel]),
                 )
             axis.set_title(title, loc="left", fontsize=9.5, pad=3)
             axis.set_xlabel(f"{dependence.symbol}, {dependence.unit}")
         pair[0].set_ylabel("mean residual, m/s²")
-        pair[1].legend(fontsize=8, loc="upper right", handlelength=1.0, labelspacing=0.2)
+        figure.legend(
+            *pair[1].get_legend_handles_labels(), loc="outside lower center", ncols=len(strongest), fontsize=8,
+            handlelength=1.6, columnspacing=1.0,
+        )  # fmt: skip
         return _svg(figure)
 
 
 def spectrum_figure(spectrum: ResidualSpectrum) -> str:
     """Draw a spectrum before and after against noise."""
     with mpl.rc_context(_STYLE):
-        figure = Figure(figsize=(5.4, 2.5), layout="constrained")
+        figure = Figure(figsize=_VIEW, layout="constrained")
         axis = figure.subplots()
         group = max(1, len(spectrum.at) // _MOST_FREQUENCIES)
         starts = np.arange(0, len(spectrum.at), group)
@@ -188,7 +189,7 @@ def spectrum_figure(spectrum: ResidualSpectrum) -> str:
 def rigid_figure(power: BandPower) -> str:
     """Draw the power of the given simulation's residual in single chips, the whole array and a spin, over frequency."""
     with mpl.rc_context(_STYLE):
-        figure = Figure(figsize=(5.4, 2.5), layout="constrained")
+        figure = Figure(figsize=_VIEW, layout="constrained")
         axis = figure.subplots()
         axis.axhline(1.0, color=_NOISE, linestyle="--", label="noise")
         parts = ((power.spin, "spin"), (power.array, "whole array"), (power.chips, "single chips"))
@@ -208,7 +209,7 @@ def rigid_figure(power: BandPower) -> str:
 def whiteness_figure(whiteness: Whiteness) -> str:
     """Draw the cumulative periodogram of every channel: noise gives the diagonal."""
     with mpl.rc_context(_STYLE):
-        figure = Figure(figsize=(5.4, 2.5), layout="constrained")
+        figure = Figure(figsize=_VIEW, layout="constrained")
         pair = figure.subplots(1, 2, sharey=True)
         frequency = whiteness.frequency
         step = max(1, len(frequency) // 400)
@@ -224,31 +225,6 @@ def whiteness_figure(whiteness: Whiteness) -> str:
             axis.set_xlabel("frequency, Hz")
             axis.set_ylim(0, 1)
         pair[0].set_ylabel("share of the power below")
-        return _svg(figure)
-
-
-def fingerprint_figure(fingerprint: Fingerprint) -> str:
-    """Draw how strongly each channel follows each basic term, before and after, in standard deviations of chance."""
-    count, terms = fingerprint.before.shape
-    largest = max(10.0, float(np.abs(fingerprint.before).max()), float(np.abs(fingerprint.after).max()))
-    with mpl.rc_context(_STYLE):
-        figure = Figure(figsize=(11.0, 0.24 * count + 1.2), layout="constrained")
-        pair = figure.subplots(1, 2, sharey=True)
-        norm = SymLogNorm(linthresh=Policy.noise_stds, vmin=-largest, vmax=largest)
-        for axis, values, title in zip(pair, (fingerprint.before, fingerprint.after), ("before", "after"), strict=True):
-            shown = np.ma.masked_where(np.abs(values) < Policy.noise_stds, values)  # the page shows through
-            axis.imshow(shown, cmap=DIVERGING, norm=norm, aspect="auto", interpolation="nearest")
-            axis.set_xticks(range(terms), fingerprint.terms, rotation=40, ha="right")
-            axis.set_yticks(range(count), fingerprint.channels)
-            axis.set_title(title, loc="left", fontsize=10)
-            axis.tick_params(length=0)
-        bar = figure.colorbar(ScalarMappable(norm, DIVERGING), ax=pair.tolist(), shrink=0.9, pad=0.01)
-        ticks = [tick for tick in (3, 10, 30, 100, 1000, 10_000) if tick <= largest]
-        bar.set_ticks(
-            [-tick for tick in ticks[::-1]] + ticks,
-            labels=[f"−{tick}" for tick in ticks[::-1]] + [f"{t}" for t in ticks],
-        )
-        bar.set_label("standard deviations")
         return _svg(figure)
 
 
@@ -287,21 +263,6 @@ def _thinned(t: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[NDArr
     return np.repeat(t[:whole:group], 2), ends
 
 
-def _bars(axis: Axes, size: ResidualSize) -> None:
-    place = np.arange(len(size.channels))
-    axis.bar(place - 0.2, size.before, 0.4, color=_BEFORE, label="before")
-    axis.bar(place + 0.2, size.after, 0.4, color=_AFTER, label="after")
-    axis.hlines(size.floor, place - 0.45, place + 0.45, color=_INK, linewidth=1.2, label="noise")
-    if np.nanmax(size.before) > 20 * np.nanmin(size.floor):
-        axis.set_yscale("log")
-    step = -(-len(place) // 24)  # of more bars than 24, every second, third … has its name
-    axis.set_xticks(place[::step], size.channels[::step], rotation=60 if len(place) > 8 else 0, fontsize=8.5)
-    axis.set_ylabel("m/s²")
-    axis.set_title("rms per channel", loc="left", fontsize=10.5)
-    axis.margins(x=0.01)
-    _legend_above(axis)
-
-
 def _legend_above(axis: Axes) -> None:
     legend = axis.legend(
         loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, fontsize=8.5, handlelength=1.2, borderpad=0
@@ -311,6 +272,15 @@ def _legend_above(axis: Axes) -> None:
 
 
 def _svg(figure: Figure, dpi: int = _DPI) -> str:
+    for text in figure.findobj(Text):
+        if isinstance(text, Text) and text.get_text():  # written by now: no tick label, which may be a formula
+            text.set_parse_math(False)  # a name may hold a dollar sign
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph .* missing")  # letters are text, for which the browser has a font
+        return _drawn(figure, dpi)
+
+
+def _drawn(figure: Figure, dpi: int) -> str:
     buffer = io.StringIO()
     if layout := figure.get_layout_engine():  # laid out here, as a figure that is saved with a layout is drawn twice
         FigureCanvasSVG(figure)
