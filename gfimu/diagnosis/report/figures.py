@@ -2,20 +2,11 @@
 
 from __future__ import annotations
 
-import base64
-import io
-import re
-import warnings
-import zlib
-
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
-from matplotlib.text import Text
 from numpy.typing import NDArray
-from PIL import Image
 from scipy.ndimage import uniform_filter1d
 
 from gfimu.diagnosis.criticism.views.dependence import Dependence
@@ -30,12 +21,12 @@ from gfimu.visual.colours import (
     BEFORE_ON_PAPER,
     INK,
     NOISE_ON_PAPER,
-    PAGE,
     PALE,
     chip_colour,
     css,
 )
 from gfimu.visual.page import PlotLimits
+from gfimu.visual.page.svg import ON_PAGE, svg_text
 from gfimu.visual.rig.figure import array_figure, channel_style
 from gfimu.visual.rig.words import short_name
 
@@ -45,7 +36,6 @@ __all__ = [
     "rig_figures",
     "rigid_figure",
     "spectrum_figure",
-    "themed",
     "trace_figure",
     "whiteness_figure",
 ]
@@ -56,29 +46,13 @@ _LIMITS = PlotLimits()
 _MANY = 24  # channels, of more of which pictures are coarser so that the page stays small
 _MOST_POINTS = 4000
 _MOST_FREQUENCIES = 1200
-_DPI, _COARSE_DPI = 110, 55
+_COARSE_DPI = 55
 _VIEW = (4.4, 2.4)  # inches: letters are legible where a view is as narrow as a telephone
-_GRID = "#ededed"  # of `array_figure`
-_STYLE = {
-    "font.family": "sans-serif",
-    "font.size": 10,
-    "svg.fonttype": "none",
-    "svg.hashsalt": "gfimu",
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.edgecolor": _NOISE,
-    "axes.labelcolor": _INK,
-    "text.color": _INK,
-    "xtick.color": _INK,
-    "ytick.color": _INK,
-    "legend.frameon": False,
-    "axes.grid": False,  # whatever style the caller has set
-}
 
 
 def trace_figure(run: RunView, size: ResidualSize) -> str:
     """Draw the residual of the channel that was worst, before and after."""
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(ON_PAGE):
         figure = Figure(figsize=(11.0, 3.0), layout="constrained")
         axis = figure.subplots()
         excess = np.nan_to_num(size.before / size.floor, nan=-1.0, posinf=0.0)
@@ -88,7 +62,7 @@ def trace_figure(run: RunView, size: ResidualSize) -> str:
         axis.set_ylabel("m/s²")
         axis.set_xlabel("time, s")
         _legend_above(axis)
-        return _svg(figure)
+        return svg_text(figure)
 
 
 def channels_figure(run: RunView, size: ResidualSize, array: AccelerometerArray) -> str:
@@ -96,7 +70,7 @@ def channels_figure(run: RunView, size: ResidualSize, array: AccelerometerArray)
     count = len(size.channels)
     columns = 3 if count % 3 == 0 else 4
     rows = -(-count // columns)
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(ON_PAGE):
         figure = Figure(figsize=(11.0, 1.35 * rows + 0.4), layout="constrained")
         axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
         for channel, axis in enumerate(axes.flat):
@@ -115,16 +89,16 @@ def channels_figure(run: RunView, size: ResidualSize, array: AccelerometerArray)
             axis.set_ylabel("m/s²")
         for axis in axes[-1]:
             axis.set_xlabel("time, s")
-        return _svg(figure, _DPI if count <= _MANY else _COARSE_DPI)
+        return svg_text(figure, _COARSE_DPI if count > _MANY else None)
 
 
 def rig_figures(
     array: AccelerometerArray, axis: TurningAxis | None, gravity: NDArray[np.float64] | None, gravity_name: str
 ) -> tuple[str, str]:
     """Draw the array with its chips, sensing axes, gravity and axis of rotation, from the side and from above."""
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(ON_PAGE):
         side, above = (
-            _svg(array_figure(array, axis=axis, gravity=gravity, gravity_name=gravity_name, views=(view,)))
+            svg_text(array_figure(array, axis=axis, gravity=gravity, gravity_name=gravity_name, views=(view,)))
             for view in ("side", "above")
         )
     return side, above
@@ -132,7 +106,7 @@ def rig_figures(
 
 def dependence_figure(dependence: Dependence, array: AccelerometerArray) -> str:
     """Draw the mean residual over one quantity, before and after, the four strongest channels in colour."""
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(ON_PAGE):
         figure = Figure(figsize=_VIEW, layout="constrained")
         pair = figure.subplots(1, 2, sharey=True)
         strongest = list(np.argsort(-dependence.amplitude_before)[: _LIMITS.coloured])
@@ -161,12 +135,12 @@ def dependence_figure(dependence: Dependence, array: AccelerometerArray) -> str:
             *pair[1].get_legend_handles_labels(), loc="outside lower center", ncols=len(strongest), fontsize=8,
             handlelength=1.6, columnspacing=1.0,
         )  # fmt: skip
-        return _svg(figure)
+        return svg_text(figure)
 
 
 def spectrum_figure(spectrum: ResidualSpectrum) -> str:
     """Draw a spectrum before and after against noise."""
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(ON_PAGE):
         figure = Figure(figsize=_VIEW, layout="constrained")
         axis = figure.subplots()
         group = max(1, len(spectrum.at) // _MOST_FREQUENCIES)
@@ -183,12 +157,12 @@ def spectrum_figure(spectrum: ResidualSpectrum) -> str:
         axis.set_xlabel("frequency, Hz" if spectrum.unit == "Hz" else spectrum.unit)
         axis.set_ylabel(spectrum.quantity)
         _legend_above(axis)
-        return _svg(figure)
+        return svg_text(figure)
 
 
 def rigid_figure(power: BandPower) -> str:
     """Draw the power of the given simulation's residual in single chips, the whole array and a spin, over frequency."""
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(ON_PAGE):
         figure = Figure(figsize=_VIEW, layout="constrained")
         axis = figure.subplots()
         axis.axhline(1.0, color=_NOISE, linestyle="--", label="noise")
@@ -203,12 +177,12 @@ def rigid_figure(power: BandPower) -> str:
         axis.set_xlabel("frequency, Hz")
         axis.set_ylabel("power over that of noise")
         _legend_above(axis)
-        return _svg(figure)
+        return svg_text(figure)
 
 
 def whiteness_figure(whiteness: Whiteness) -> str:
     """Draw the cumulative periodogram of every channel: noise gives the diagonal."""
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(ON_PAGE):
         figure = Figure(figsize=_VIEW, layout="constrained")
         pair = figure.subplots(1, 2, sharey=True)
         frequency = whiteness.frequency
@@ -225,7 +199,7 @@ def whiteness_figure(whiteness: Whiteness) -> str:
             axis.set_xlabel("frequency, Hz")
             axis.set_ylim(0, 1)
         pair[0].set_ylabel("share of the power below")
-        return _svg(figure)
+        return svg_text(figure)
 
 
 def _trace(axis: Axes, run: RunView, channel: int, floor: float) -> None:
@@ -269,60 +243,3 @@ def _legend_above(axis: Axes) -> None:
     )
     for line in legend.get_lines():
         line.set_linewidth(2.0)
-
-
-def _svg(figure: Figure, dpi: int = _DPI) -> str:
-    for text in figure.findobj(Text):
-        if isinstance(text, Text) and text.get_text():  # written by now: no tick label, which may be a formula
-            text.set_parse_math(False)  # a name may hold a dollar sign
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "Glyph .* missing")  # letters are text, for which the browser has a font
-        return _drawn(figure, dpi)
-
-
-def _drawn(figure: Figure, dpi: int) -> str:
-    buffer = io.StringIO()
-    if layout := figure.get_layout_engine():  # laid out here, as a figure that is saved with a layout is drawn twice
-        FigureCanvasSVG(figure)
-        figure.set_dpi(72)  # points per inch, in which SVG is laid out
-        layout.execute(figure)
-        figure.set_layout_engine(None)
-    figure.savefig(buffer, format="svg", dpi=dpi, metadata={"Date": None})
-    text = buffer.getvalue()
-    text = text[text.index("<svg") :]
-    text = re.sub(r"<metadata>.*?</metadata>", "", text, count=1, flags=re.DOTALL)
-    text = re.sub(r'(<image\b[^>]*?) id="[^"]*"', r"\1", text)  # equal pictures would share one name
-    text = re.sub(r"(?<=base64,)[^\"]+", lambda match: _few_colours(match.group()), text)
-    text = _shortened(text)
-    # Several figures share one page: their definitions must not share names; the size follows the page.
-    tag = f"f{zlib.crc32(text.encode()):08x}"
-    text = re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{tag}_", text)
-    return re.sub(r"<svg [^>]*>", lambda match: re.sub(r' (width|height)="[^"]*"', "", match.group(0)), text, count=1)
-
-
-def _shortened(svg: str) -> str:
-    """Return a figure without comments, without names that nothing refers to, and with two decimals of a point."""
-    svg = re.sub(r"<!--.*?-->", "", svg, flags=re.DOTALL)
-    used = set(re.findall(r'(?:url\(|href=")#([^)"]+)', svg))
-    svg = re.sub(r' id="([^"]+)"', lambda match: match[0] if match[1] in used else "", svg)
-    svg = re.sub(r"<defs>\s*<style[^>]*>.*?</style>\s*</defs>", "", svg, flags=re.DOTALL)
-    svg = re.sub(r"(?<=[ \"(,-])\d+\.\d{3,}", lambda match: f"{float(match[0]):.2f}".rstrip("0").rstrip("."), svg)
-    return re.sub(r"\s*\n\s*", " ", svg)
-
-
-def _few_colours(picture: str) -> str:
-    """Return a PNG picture in base64 with at most 64 colours, which is a third as long."""
-    image = Image.open(io.BytesIO(base64.b64decode(picture))).convert("RGBA")
-    buffer = io.BytesIO()
-    image.quantize(64, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE).save(buffer, "png", optimize=True)
-    return base64.b64encode(buffer.getvalue()).decode("ascii")
-
-
-def themed(svg: str, chips: int) -> str:
-    """Return a figure whose colours are those of the page, by day and by night, in place of fixed ones."""
-    names = {
-        css(PAGE["light"][name]): name for name in ("card", "ink", "noise", "band", "before", "after", "spin-axis")
-    }
-    names[_GRID] = "line"
-    names |= {css(chip_colour(number, on_paper=True)): f"chip-{number}" for number in range(chips)}
-    return re.sub(r"#[0-9a-f]{6}\b", lambda match: f"var(--{names[match[0]]})" if match[0] in names else match[0], svg)

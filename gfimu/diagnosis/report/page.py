@@ -35,8 +35,8 @@ from gfimu.diagnosis.verdict.verdict import Diagnosis, NamedCause
 from gfimu.diagnosis.verdict.wording import SAME_SHARE
 from gfimu.files.atomic_file import write_text
 from gfimu.geometry.array import AccelerometerArray
-from gfimu.visual.colours import PAGE, chip_colour, css
-from gfimu.visual.page import Packed, page_plots
+from gfimu.visual.page import Packed, page_plots, page_style
+from gfimu.visual.page.svg import themed
 from gfimu.visual.rig import package_of
 from gfimu.visual.rig.words import package_words, scene_title
 
@@ -106,7 +106,7 @@ def _content(diagnosis: Diagnosis, rig: DrawnRig) -> Mapping[str, Any]:
         "version": __version__,
         "label": label,
         "tone": tone,
-        "themes": _themes(len(array.chips)),
+        "style": page_style(len(array.chips)),
         "plots": page_plots({"plots": plots}, data),
         "plot_rule": _plot_rule(plots["residual"]["grouped"]) if seen else "",
         "array": _array(diagnosis, rig),
@@ -135,17 +135,8 @@ def _content(diagnosis: Diagnosis, rig: DrawnRig) -> Mapping[str, Any]:
     }
 
 
-def _themes(chips: int) -> Mapping[str, Mapping[str, str]]:
-    """Return the colours of the page by day and by night, with one for each chip."""
-    return {
-        theme: {name: css(colour) for name, colour in colours.items()}
-        | {f"chip-{number}": css(chip_colour(number, on_paper=theme == "light")) for number in range(chips)}
-        for theme, colours in PAGE.items()
-    }
-
-
 def _picture(svg: str, array: AccelerometerArray) -> str:
-    return figures.themed(svg, len(array.chips))
+    return themed(svg, len(array.chips))
 
 
 def _plot_rule(grouped: int) -> str:

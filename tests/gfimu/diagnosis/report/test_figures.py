@@ -18,6 +18,7 @@ from gfimu.diagnosis.report import figures
 from gfimu.diagnosis.report.rig import DrawnRig
 from gfimu.geometry.array import AccelerometerArray, Chip
 from gfimu.visual.colours import AFTER_ON_PAPER, BEFORE_ON_PAPER, chip_colour, css
+from gfimu.visual.page.svg import themed
 
 CHANNELS = ("a11", "a12", "a13", "a21")
 ARRAY = AccelerometerArray(
@@ -83,7 +84,7 @@ def test_before_after_and_the_chips_have_their_colours_in_every_figure(views, vi
 
 
 def test_a_figure_takes_the_colours_of_the_page(views, view):
-    svg = figures.themed(drawn(views, view)["dependence"], 2)
+    svg = themed(drawn(views, view)["dependence"], 2)
     assert {"var(--chip-0)", "var(--chip-1)", "var(--ink)", "var(--noise)", "var(--card)"} <= set(
         re.findall(r"var\([^)]+\)", svg)
     )
