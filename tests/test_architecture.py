@@ -274,6 +274,7 @@ ROOMS = {
         "gfimu.parts",
         "gfimu.recording",
         "gfimu.sensor_noise",
+        "gfimu.visual.page",
     },
     "gfimu.exporting": {
         "gfimu.calibration",

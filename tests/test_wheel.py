@@ -69,6 +69,7 @@ def test_models_lie_inside_the_wheel(installed: Path) -> None:
     for name in (
         "plots.js",
         "plots.css",
+        "basics.css",
         "page.css",
         "uplot/uPlot.iife.min.js",
         "uplot/uPlot.min.css",

@@ -98,8 +98,12 @@ def channel_bars(size: ResidualSize, array: AccelerometerArray) -> ChannelBars:
         RmsRow(
             name,
             int(chip),
-            *(three_digits(float(value)) for value in values),
-            *(round(float(length), 1) for length in drawn),
+            three_digits(float(values[0])),
+            three_digits(float(values[1])),
+            three_digits(float(values[2])),
+            round(float(drawn[0]), 1),
+            round(float(drawn[1]), 1),
+            round(float(drawn[2]), 1),
         )
         for name, chip, values, drawn in zip(size.channels, array.chip_of_channel, table, bars, strict=True)
     )

@@ -3,6 +3,6 @@
 from gfimu.visual.page.content import page_plots
 from gfimu.visual.page.limits import PlotLimits
 from gfimu.visual.page.packed import Packed, enveloped
-from gfimu.visual.page.style import STILL_POLICY, page_style
+from gfimu.visual.page.style import STILL_POLICY, page_basics, page_style
 
-__all__ = ["STILL_POLICY", "Packed", "PlotLimits", "enveloped", "page_plots", "page_style"]
+__all__ = ["STILL_POLICY", "Packed", "PlotLimits", "enveloped", "page_basics", "page_plots", "page_style"]

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from gfimu.visual.colours import PAGE, TONES, chip_colour, css
 
-__all__ = ["STILL_POLICY", "page_style"]
+__all__ = ["STILL_POLICY", "page_basics", "page_style"]
 
 STILL_POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
 """Content-Security-Policy of a page without scripts: nothing runs and nothing is loaded."""
@@ -20,10 +20,21 @@ def page_style(chips: int = 0) -> str:
     chips : int
         Chips that have a colour of their own, ``--chip-0`` and so on.
     """
-    light, dark = (_variables(theme, chips) for theme in ("light", "dark"))
     tones = " ".join(f".{tone} {{ --tone: var(--{tone}); }}" for tone in TONES)
-    rules = (Path(__file__).parent / "page.css").read_text(encoding="utf-8")
-    return f"{light}\n@media screen and (prefers-color-scheme: dark) {{ {dark} }}\n{tones}\n{rules}"
+    return f"{page_basics(chips)}\n{tones}\n{_rules('page.css')}"
+
+
+def page_basics(chips: int = 0) -> str:
+    """Return what a page with rules of its own shares with the others: colours as variables, and tables that scroll.
+
+    The colours are those of the day and of the night; paper is light. Parameters as of `page_style`.
+    """
+    light, dark = (_variables(theme, chips) for theme in ("light", "dark"))
+    return f"{light}\n@media screen and (prefers-color-scheme: dark) {{ {dark} }}\n{_rules('basics.css')}"
+
+
+def _rules(name: str) -> str:
+    return (Path(__file__).parent / name).read_text(encoding="utf-8")
 
 
 def _variables(theme: str, chips: int) -> str:
