@@ -53,8 +53,8 @@ def drawn_chips(
         axes.scatter(*place, s=36, color=colour)
         for direction in directions:
             axes.quiver(*place, *(0.35 * reach * direction), color=colour, linewidth=1.4, arrow_length_ratio=0.25)
-        axes.text(*(place + 0.08 * reach), name, fontsize=9)
-    axes.set_title(f"{title}, body frame", fontsize=10)
+        axes.text(*(place + 0.08 * reach), _as_it_is(name), fontsize=9)
+    axes.set_title(_as_it_is(f"{title}, body frame"), fontsize=10)
     for axis in "xyz":
         getattr(axes, f"set_{axis}lim")(-1.4 * reach, 1.4 * reach)
         getattr(axes, f"set_{axis}label")(f"{axis}, mm")
@@ -75,8 +75,8 @@ def _new_figure(across: int, down: int) -> Figure:
 
 
 def _draw(axes: Any, panel: Panel) -> None:
-    axes.set_title(panel.title, fontsize=10)
-    axes.set_ylabel(panel.y_label)
+    axes.set_title(_as_it_is(panel.title), fontsize=10)
+    axes.set_ylabel(_as_it_is(panel.y_label))
     (_draw_names if panel.by_name else _draw_lines)(axes, panel)
     if panel.scale == "zero":
         axes.set_ylim(bottom=0.0, top=1.05 * axes.get_ylim()[1])
@@ -117,14 +117,26 @@ def _draw_names(axes: Any, panel: Panel) -> None:
             color=_colour(series, number), label=_label(series) or "_",
         )  # fmt: skip
     turned = len(names) > _MANY_NAMES or max(map(len, names), default=0) > 14
-    axes.set_xticks(places, names, rotation=60 if turned else 0, ha="right" if turned else "center", fontsize=8)
+    axes.set_xticks(
+        places,
+        list(map(_as_it_is, names)),
+        rotation=60 if turned else 0,
+        ha="right" if turned else "center",
+        fontsize=8,
+    )
     axes.set_xlim(-0.6, len(names) - 0.4)
     if panel.x_label and panel.x_label != OF_TIME:
         axes.set_xlabel(panel.x_label)
 
 
 def _label(series: Series) -> str:
-    return f"{series.name} ± 2σ" if series.name and series.std is not None else series.name
+    name = _as_it_is(series.name)
+    return f"{name} ± 2σ" if name and series.std is not None else name
+
+
+def _as_it_is(text: str) -> str:
+    """Return a text that matplotlib does not read as a formula, as it would a name with two dollar signs."""
+    return text.replace("$", r"\$")
 
 
 def _colour(series: Series, place: int) -> str:
