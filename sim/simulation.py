@@ -232,11 +232,20 @@ def _metadata(run: Scenario, sensor: Sensor, seed: int) -> dict[str, Any]:
         "software_version": gfimu.__version__,
         "mounting_rotvec_rad": list(run.mounting_rotvec),
         **run.place,
+        **_rig_axis(run),
         "lsb_m_s2": float(sensor.lsb[0]),
         "effects": [{"name": effect.name, "parameters": effect.parameters} for effect in run.effects],
         "truth_bias_m_s2": errors,
         "truth_scale_factor": gains,
     }
+
+
+def _rig_axis(run: Scenario) -> dict[str, Any]:
+    """Return the axis of a pendulum, where the array file does not say it: pictures draw the rig from it."""
+    axis = None if run.free or run.array.turning_axis is not None else run.world.leaning_axis()
+    if axis is None:
+        return {}
+    return {"rig_axis": replace(axis, hub="free" if isinstance(run.motion, Wheel) else "fixed").to_dict()}
 
 
 def _without_lost_frames(recording: Recording) -> Recording:

@@ -298,6 +298,7 @@ ROOMS = {
         "gfimu.parts",
         "gfimu.recording",
         "gfimu.sensor_noise",
+        "gfimu.visual.page",
     },
     "gfimu.exporting": {
         "gfimu.calibration",

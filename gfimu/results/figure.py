@@ -135,14 +135,21 @@ def _draw_names(axes: Any, panel: Panel) -> None:
             color=_colour(series, number), label=_label(series) or "_",
         )  # fmt: skip
     turned = len(names) > _MANY_NAMES or max(map(len, names), default=0) > 14
-    axes.set_xticks(places, names, rotation=60 if turned else 0, ha="right" if turned else "center", fontsize=8)
+    axes.set_xticks(
+        places,
+        list(names),
+        rotation=60 if turned else 0,
+        ha="right" if turned else "center",
+        fontsize=8,
+    )
     axes.set_xlim(-0.6, len(names) - 0.4)
     if panel.x_label and panel.x_label != OF_TIME:
         axes.set_xlabel(panel.x_label)
 
 
 def _label(series: Series) -> str:
-    return f"{series.name} ± 2σ" if series.name and series.std is not None else series.name
+    name = series.name
+    return f"{name} ± 2σ" if name and series.std is not None else name
 
 
 def _colour(series: Series, place: int) -> str:

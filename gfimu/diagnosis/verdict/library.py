@@ -159,7 +159,8 @@ def with_wider_library(found: Diagnosis) -> Diagnosis:
 def _sentence(least: float, evidence: LibraryEvidence) -> str:
     """Say how likely it is that the truth is among the effects that were tried, and what would test it."""
     stated = (
-        f"What is named is the truth, confounded with nothing outside the library, with a probability of {least:.0%}"
+        "What is named is the truth, confounded with nothing outside the library, with a probability of "
+        f"{100 * least:.0f} %"
     )
     if evidence.confirmed:
         return stated

@@ -86,8 +86,8 @@ def _held_out(residual: Residual, gain: Gain) -> list[str]:
     words = []
     if np.isfinite(gain.share_of_excess_removed):
         words.append(
-            f"On validation data ({gain.held_out}), {gain.share_of_excess_removed:.1%} of the excess is gone"
-            f"{_anywhere(gain)}."
+            f"On validation data ({gain.held_out}), {100 * gain.share_of_excess_removed:.1f} % of the excess "
+            f"is gone{_anywhere(gain)}."
         )
         words += _far_below(residual, gain)
     if np.isnan(gain.rms_after):
@@ -131,7 +131,7 @@ def _anywhere(gain: Gain) -> str:
     share = gain.share_in_any_recording
     if not np.isfinite(share) or abs(share - gain.share_of_excess_removed) < SAME_SHARE:
         return ""
-    return f"; without terms of absolute time, as in any other recording, {max(share, 0.0):.1%}"
+    return f"; without terms of absolute time, as in any other recording, {100 * max(share, 0.0):.1f} %"
 
 
 def _far_below(residual: Residual, gain: Gain) -> list[str]:
@@ -144,8 +144,8 @@ def _far_below(residual: Residual, gain: Gain) -> list[str]:
     if share + 2.0 * float(np.nan_to_num(gain.share_std)) > fitted - Policy.sizeable:
         return []
     sentence = (
-        f"On the fitted data {fitted:.0%} of it is gone: so much more than on validation data that the sizes may "
-        "belong to this recording alone; confirm them on another one."
+        f"On the fitted data {100 * fitted:.0f} % of it is gone: so much more than on validation data that the sizes "
+        "may belong to this recording alone; confirm them on another one."
     )
     return [sentence]
 
@@ -158,8 +158,8 @@ def _headline(verdict: str, causes: Sequence[NamedCause], unexplained: Unexplain
         return "The simulation agrees with the measurement: nothing was found beyond the sensors' own noise."
     if verdict == "explained" and gain.share_of_excess_removed < 1.0 - Policy.small:
         return (
-            f"The simulation is wrong in part because of {names}: {gain.share_of_excess_removed:.0%} of the excess is "
-            "gone on validation data."
+            f"The simulation is wrong in part because of {names}: {100 * gain.share_of_excess_removed:.0f} % of the "
+            "excess is gone on validation data."
         )
     if verdict == "explained":
         return f"The simulation is wrong because of {names}."

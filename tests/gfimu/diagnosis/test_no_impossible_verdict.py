@@ -62,7 +62,7 @@ def test_causes_that_explain_in_part_say_so_everywhere():
     assert "in part" not in headline(whole)
     assert "Verdict: Explained in part" in report_html(part)
     told = verdict_sentences("explained", part.causes, part.residual, part.gain, part.unexplained, ())
-    assert told[0].startswith("The simulation is wrong in part because of table_tilt: 67% of the excess is gone")
+    assert told[0].startswith("The simulation is wrong in part because of table_tilt: 67 % of the excess is gone")
     assert any("so much more than on validation data" in sentence for sentence in told)
 
 

@@ -1,5 +1,6 @@
 """What every result offers a notebook: HTML, tables, pictures, rerun; by one mechanism."""
 
+import dataclasses
 import sys
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -251,3 +252,16 @@ def test_a_result_logs_to_a_stream_of_the_caller(results):
     stream.disconnect()
     assert b"rateestimate/angular_rate" in data
     assert b"mine/facts" in data
+
+
+def test_a_name_with_dollar_signs_is_drawn_as_it_is():
+    """Matplotlib reads what stands between two of them as a formula, and refuses some."""
+    name = "left $^$"
+    chip = gfimu.AccelerometerArray.load("one_chip").chips[0]
+    array = gfimu.AccelerometerArray("$_$", (dataclasses.replace(chip, name=name),))
+    array.plot().canvas.draw()
+    over_names = Panel("$_$", "m/s²", (Series(name, np.ones(2)),), (name, "a2"))
+    over_time = Panel("t", "$^$", (Series(name, np.ones(3)),), np.arange(3.0))
+    figure = drawn([over_names, over_time])
+    figure.canvas.draw()
+    assert figure.axes[0].get_xticklabels()[0].get_text() == r"left \$^\$"

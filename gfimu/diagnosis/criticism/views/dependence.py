@@ -339,7 +339,7 @@ def _sentence(quantity: Quantity, channels: Sequence[str], old: _Regression, new
         return (
             f"Before, the residual follows {quantity.name} in {listed(names)} "
             f"({old.amplitude[top]:.2g} m/s² rms in {channels[top]}, "
-            f"{old.share[top]:.0%} of what is beyond noise there); {after or 'after: gone'}."
+            f"{100 * old.share[top]:.0f} % of what is beyond noise there); {after or 'after: gone'}."
         )
     if after:
         return f"The residual follows {quantity.name}; {after}."

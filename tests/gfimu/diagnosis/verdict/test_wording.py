@@ -33,11 +33,11 @@ def test_explained():
         "table_tilt: gravity turns once per revolution.",
         "The residual falls from 0.3 to 0.1 m/s²; the noise alone is 0.1 m/s².",
     )
-    assert words[3].startswith("On validation data (blocks), 97.0% of the excess is gone.")
+    assert words[3].startswith("On validation data (blocks), 97.0 % of the excess is gone.")
     assert len(words) == 4
     part = told("explained", [TILT], gain=Gain("blocks", 0.3, 0.1, 0.85, 2.0, 0.1))
     assert part[0] == (
-        "The simulation is wrong in part because of table_tilt: 85% of the excess is gone on validation data."
+        "The simulation is wrong in part because of table_tilt: 85 % of the excess is gone on validation data."
     )
 
 
@@ -54,7 +54,7 @@ def test_what_is_left_is_told_from_a_tenth_of_the_noise_on(after, says):
 def test_far_less_on_unseen_data_is_told():
     # Fitted: all of the excess; unseen: a quarter less is the limit, beyond two standard errors.
     far = told("explained", [TILT], gain=Gain("blocks", 0.3, 0.1, 0.7, 2.0, 0.1, share_std=0.01))
-    assert any(one.startswith("On the fitted data 100% of it is gone") for one in far)
+    assert any(one.startswith("On the fitted data 100 % of it is gone") for one in far)
     near = told("explained", [TILT], gain=Gain("blocks", 0.3, 0.1, 0.7, 2.0, 0.1, share_std=0.05))
     assert not any(one.startswith("On the fitted data") for one in near)
 
