@@ -17,7 +17,7 @@ def page(project_root):
 
 def test_the_plans_of_the_page_are_plans(page, tmp_path):
     plans = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
-    assert len(plans) == 4
+    assert len(plans) == 5
     sizes = []
     for text in plans:
         (tmp_path / "plan.toml").write_text(text)
