@@ -25,7 +25,7 @@ def test_the_plans_of_the_page_are_plans(page, tmp_path):
         design = Design(plan)
         check_factors(plan, design[0], "plan.toml")
         sizes.append(len(design))
-    assert sizes == [240, 128 * 6 * 16, 100_000, 64 * 2]
+    assert sizes == [120, 240, 128 * 6 * 16, 100_000, 64 * 2]
 
 
 def test_the_figure_of_the_page_is_there_and_small(page, project_root):
