@@ -61,8 +61,8 @@ class Noise(_Discrete):
     :experiment: Record a long rest and compare with the data sheet (`gfimu noise`). At rest on foam, vibration of the
         bench is gone and noise of the chip stays.
     :recordings: MIMU4444: the channels' noise at rest is 0.037 m/s² rms.
-    :rivals: It changes the scatter of the readings and not their mean. A diagnosis estimates the white noise in its fit,
-        and names this effect where the noise of all channels exceeds the data sheet's.
+    :rivals: It changes the scatter of the readings and not their mean. A diagnosis estimates the white noise in its
+        fit, and names this effect where the noise of all channels exceeds the data sheet's.
     """
 
     name = "noise"
