@@ -5,6 +5,7 @@ import collections.abc
 import importlib
 import inspect
 import math
+import re
 import sys
 import typing
 from pathlib import Path
@@ -96,6 +97,16 @@ def test_what_a_command_returns_shows_itself_in_a_notebook(name):
         assert hasattr(one, "_repr_html_"), one
         assert issubclass(one, TableResult), one
         assert around == (), f"a container of {one.__name__} shows no table; return a result that iterates"
+
+
+def test_the_page_of_the_commands_names_what_each_returns(project_root):
+    page = (project_root / "docs" / "reference" / "commands.md").read_text(encoding="utf-8")
+    rows = dict(re.findall(r"^\| `gfimu [^|]*\| `gfimu\.([a-z._]+)\([^|]*\| ([^|]*)\|", page, re.MULTILINE))
+    assert len(rows) > 35
+    functions = command_functions()
+    for name, cell in rows.items():
+        names = {one.__name__ for one, _ in own_types(returned(functions[name]))}
+        assert names <= set(re.findall(r"`(\w+)`", cell)), name
 
 
 def test_one_mechanism_makes_all_html():
