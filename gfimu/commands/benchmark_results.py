@@ -134,7 +134,7 @@ class Judgement(PlottedResult):
     def _notes(self) -> tuple[str, ...]:
         from sim.benchmark.table import POINTS_NOTE
 
-        return ("Intervals are of 95 %.", POINTS_NOTE)
+        return (POINTS_NOTE, "intervals: 95 %")
 
     def _panels(self) -> list[Panel]:
         sets = tuple(dict.fromkeys(one.set_name for one in self.summaries))

@@ -21,7 +21,7 @@ COLUMNS = (
 )
 """Heads of the table."""
 
-POINTS_NOTE = "Points: right 1, in part or in a set 0.5 or less, unknown 0.25, missed 0, wrong name or false alarm -1."
+POINTS_NOTE = "points: right 1, in part or in a set 0.5 or less, unknown 0.25, missed 0, wrong name or false alarm -1"
 """What the points mean, below the table."""
 
 _SHARES = {
