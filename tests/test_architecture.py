@@ -463,7 +463,7 @@ LARGE_ROOMS = {
         "sim.twin",
         "sim.worlds",
     },
-    "sim.sweep": {"gfimu.files", "gfimu.visual.colours"},
+    "sim.sweep": {"gfimu.files", "gfimu.visual.colours", "gfimu.visual.page"},
 }
 """The same of folders with more files, many of one kind: a method, an effect, a part of a chip each."""
 

@@ -75,6 +75,17 @@ def test_a_page_has_its_parts(folder, name):
     assert not VAGUE.search(re.sub(r"`[^`]*`", "", page))
 
 
+@pytest.mark.parametrize("name", EFFECTS)
+def test_an_effect_without_computed_rivals_says_how_it_is_found(folder, name):
+    own = describe(EFFECTS[name]).rivals
+    assert bool(own) == (not effect_catalogue()[name]["motions"])
+    page = (folder / f"{name}.md").read_text(encoding="utf-8")
+    rivals = page.partition("## Rivals")[2].partition("##")[0]
+    assert own.replace("``", "`") in rivals
+    if EFFECTS[name].place != "data":  # only a fault of the samples is found before a fit
+        assert "before any fit" not in rivals
+
+
 def test_the_pictures_are_small_and_have_ink(folder):
     pictures = sorted((folder / "figures").glob("*.png"))
     assert [one.stem for one in pictures] == sorted(EFFECTS)

@@ -115,6 +115,13 @@ def test_the_paper_cites_what_its_bibliography_holds(project_root):
     assert len(held) > 5
 
 
+def test_every_reference_of_the_paper_can_be_found(project_root):
+    entries = text(project_root, "docs/paper/paper.bib").split("\n@")
+    assert len(entries) > 5
+    for entry in entries:
+        assert re.search(r"^  doi +=  *\{10\.\d{4,}/\S+\}|^  note +=", entry, re.MULTILINE), entry
+
+
 STUDY_COLUMNS = (0, 1, 2, 3, 4, 6, 7)
 """Of the study's table: list, worlds, hidden, runs, right alone, right in any set, wrong name."""
 

@@ -54,7 +54,7 @@ def page(effect: type[Effect], numbers: Mapping[str, Any]) -> str:
         "## Signature",
         _signature(effect, text, numbers["signature"]),
         "## Rivals",
-        _rivals(effect, numbers),
+        _rivals(effect, text, numbers),
         "## How to separate it",
         _separation(text, numbers),
         "## In real data",
@@ -179,13 +179,11 @@ def _signature(effect: type[Effect], text: Description, found: Mapping[str, Any]
     return f"![{alt}](figures/{effect.name}.png)\n\n" + " ".join(sentences)
 
 
-def _rivals(effect: type[Effect], numbers: Mapping[str, Any]) -> str:
+def _rivals(effect: type[Effect], text: Description, numbers: Mapping[str, Any]) -> str:
     motions = numbers["motions"]
     if not motions:
-        return (
-            "It has no size that a motion could enlarge, and no column in the normal equations: it is found from the "
-            "samples themselves before any fit, and computed rivals do not apply."
-        )
+        none = "No rivals are computed, as it has no column in the normal equations of the standard motions."
+        return f"{none} {_plain(text.rivals)}".rstrip()
     rows = ["| motion | d′ | rivals: share that each explains, and nats that remain |", "|---|---|---|"]
     for motion, one in motions.items():
         if one["detectability"] < _ANY:

@@ -13,6 +13,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from numpy.typing import NDArray
+
 import gfimu
 from firmware_bridge.frames.commands import Identity, asked_rate
 from firmware_bridge.frames.decoder import FrameFormat, StreamCounts
@@ -36,6 +38,7 @@ from gfimu.files.outputs import RECORDING, check_outputs
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.parts.part import Part
 from gfimu.recording.carried_array import array_metadata
+from gfimu.results import TableResult, one_row
 
 __all__ = ["Batch", "RecordReport", "SampleClock", "record"]
 
@@ -44,7 +47,7 @@ _LOST_S = 2.0  # without a frame, after which the speed is looked for again
 
 
 @dataclass(frozen=True)
-class RecordReport:
+class RecordReport(TableResult):
     """What was recorded.
 
     Parameters
@@ -93,6 +96,16 @@ class RecordReport:
     array_stated_by: str = ""
     board_array: str = ""
     temperature_degC: tuple[float, float] | None = None
+
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """Return one row: file, length, counts of the stream, array."""
+        counts = {name: getattr(self.stream, name) for name in ("samples", "lost", "corrupt", "restarts")}
+        return one_row(
+            {"path": self.path, "duration_s": self.duration_s, **counts, "breaks": self.breaks, "array": self.array}
+        )
+
+    def _heading(self) -> str:
+        return "Recording from a board"
 
 
 def record(

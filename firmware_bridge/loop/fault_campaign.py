@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +14,9 @@ from firmware_bridge.frames.commands import Command, encode_command, sample_at
 from firmware_bridge.frames.decoder import LPC1768_DTYPE, FrameType, SampleDecoder, Status, StreamCounts
 from firmware_bridge.loop.board_process import BoardProcess
 from firmware_bridge.loop.physics import Conversions
+from gfimu.results import TableResult, text_column
 
-__all__ = ["FAULTS", "FaultOutcome", "resample_line", "run_campaign", "run_fault"]
+__all__ = ["FAULTS", "FaultOutcome", "FaultReport", "resample_line", "run_campaign", "run_fault"]
 
 _RATE_HZ = 800
 _BOOT_S, _RUN_S = 0.05, 1.0
@@ -59,6 +61,42 @@ class FaultOutcome:
     def passed(self) -> bool:
         """Nothing invented, nothing lost that arrived whole, and good frames afterwards."""
         return self.invented == 0 and self.frames_decoded == self.frames_whole and self.recovered
+
+
+@dataclass(frozen=True)
+class FaultReport(TableResult):
+    """What the host makes of each fault; counts and iterates like a list of `FaultOutcome`.
+
+    Parameters
+    ----------
+    outcomes : tuple of FaultOutcome
+        One per fault.
+    """
+
+    outcomes: tuple[FaultOutcome, ...]
+
+    def __len__(self) -> int:
+        return len(self.outcomes)
+
+    def __iter__(self) -> Iterator[FaultOutcome]:
+        return iter(self.outcomes)
+
+    def __getitem__(self, place: int) -> FaultOutcome:
+        return self.outcomes[place]
+
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """Return one row per fault: frames, what the decoder reports, whether the host took no fault for data."""
+        counts = {key: [getattr(one, key) for one in self] for key in ("frames_whole", "frames_decoded", "invented")}
+        counts |= {key: [getattr(one.counts, key) for one in self] for key in ("lost", "corrupt", "restarts")}
+        return {
+            "fault": text_column(one.fault for one in self),
+            **{name: np.array(values, dtype=int) for name, values in counts.items()},
+            "reported": text_column(", ".join(one.reported) for one in self),
+            "passed": np.array([one.passed for one in self], dtype=bool),
+        }
+
+    def _heading(self) -> str:
+        return "Faults and what the host makes of them"
 
 
 @dataclass(frozen=True)
@@ -231,14 +269,14 @@ def run_fault(
 
 def run_campaign(
     *, physics: Conversions | None = None, seed: int = 0, progress: Callable[[float], None] | None = None
-) -> list[FaultOutcome]:
+) -> FaultReport:
     """Run all faults; return the table."""
     rows = []
     for number, name in enumerate(FAULTS):
         rows.append(run_fault(name, physics=physics, seed=seed))
         if progress is not None:
             progress((number + 1) / len(FAULTS))
-    return rows
+    return FaultReport(tuple(rows))
 
 
 def _keys(sequence: NDArray[np.uint16], counts: NDArray[np.int16]) -> NDArray[np.int32]:

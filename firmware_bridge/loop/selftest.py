@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from firmware_bridge.frames.commands import Command, encode_command, sample_at, set_rate
 from firmware_bridge.frames.decoder import SampleDecoder, Status
@@ -10,8 +15,9 @@ from firmware_bridge.host.chip_selftest import judge
 from firmware_bridge.loop.board_process import BoardProcess, require_emulator
 from firmware_bridge.lpc1768.build import check_image
 from gfimu.optional_packages import missing
+from gfimu.results import TableResult, text_column
 
-__all__ = ["SelfTestRow", "run_selftest"]
+__all__ = ["SelfTestReport", "SelfTestRow", "run_selftest"]
 
 _INTERRUPTS = 10_000
 _SELFCHECK_S = 20.0
@@ -29,7 +35,40 @@ class SelfTestRow:
     measured: str
 
 
-def run_selftest() -> list[SelfTestRow]:
+@dataclass(frozen=True)
+class SelfTestReport(TableResult):
+    """Checks of the emulator and the firmware; counts and iterates like a list of `SelfTestRow`.
+
+    Parameters
+    ----------
+    rows : tuple of SelfTestRow
+        One per check.
+    """
+
+    rows: tuple[SelfTestRow, ...]
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __iter__(self) -> Iterator[SelfTestRow]:
+        return iter(self.rows)
+
+    def __getitem__(self, place: int) -> SelfTestRow:
+        return self.rows[place]
+
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """Return one row per check: whether it passed, and what was measured."""
+        return {
+            "check": text_column(row.check for row in self),
+            "passed": np.array([row.passed for row in self], dtype=bool),
+            "measured": text_column(row.measured for row in self),
+        }
+
+    def _heading(self) -> str:
+        return "Self-test of the emulator and the firmware"
+
+
+def run_selftest() -> SelfTestReport:
     """Run all checks.
 
     Raises
@@ -41,7 +80,7 @@ def run_selftest() -> list[SelfTestRow]:
     rows = [_image("gfimu"), _image("selfcheck"), _interrupts(), _chips()]
     if not missing("ziglang"):
         rows.append(_fast_path())
-    return rows
+    return SelfTestReport(tuple(rows))
 
 
 def _image(name: str) -> SelfTestRow:

@@ -13,12 +13,15 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
+
+from numpy.typing import NDArray
 
 from firmware_bridge.adxl345.registers import TICKS_PER_SECOND
 from firmware_bridge.loop.board_process import BoardProcess
 from firmware_bridge.loop.line_speed import as_received, terminal_baud
 from gfimu.errors import InputError
+from gfimu.results import TableResult, one_row
 
 __all__ = ["PseudoTerminal", "ServeReport", "TcpPort", "VirtualPort", "open_port", "serve"]
 
@@ -183,7 +186,7 @@ def open_port(port: str) -> VirtualPort:
 
 
 @dataclass(frozen=True)
-class ServeReport:
+class ServeReport(TableResult):
     """What a virtual board did.
 
     Parameters
@@ -202,6 +205,17 @@ class ServeReport:
     refused: int
     received: int
     warnings: tuple[str, ...] = ()
+
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """Return one row: virtual and real time, bytes each way."""
+        counts = {f"{name}_bytes": getattr(self, name) for name in ("sent", "refused", "received")}
+        return one_row({"virtual_s": self.virtual_s, "wall_s": self.wall_s, **counts})
+
+    def _heading(self) -> str:
+        return "Virtual board behind a port"
+
+    def _notes(self) -> tuple[str, ...]:
+        return self.warnings
 
 
 class _Buffer:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 import gfimu
 from firmware_bridge.adxl345.registers import TICKS_PER_SECOND, Adxl345Options
@@ -26,6 +28,7 @@ from firmware_bridge.loop.physics import RidePhysics, Scene
 from gfimu.errors import InputError
 from gfimu.recording import Recording
 from gfimu.recording.carried_array import array_metadata
+from gfimu.results import Panel, RunResult
 
 __all__ = ["VirtualRun", "record_virtual", "typical_chips"]
 
@@ -38,7 +41,7 @@ _CLOCK_ERROR_STD = 0.005
 
 
 @dataclass(frozen=True)
-class VirtualRun:
+class VirtualRun(RunResult):
     """What came of a run.
 
     Parameters
@@ -57,6 +60,32 @@ class VirtualRun:
     stream: StreamCounts
     identity: Identity | None
     warnings: tuple[str, ...] = ()
+
+    @property
+    def metadata(self) -> Mapping[str, Any]:
+        """Metadata of the recording."""
+        return self.recording.metadata
+
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """Return the columns of the recording."""
+        return self.recording.to_columns()
+
+    def to_rerun(self, path: str | Path) -> Path:
+        """Write the recording as a rerun recording (`gfimu.Recording.to_rerun`)."""
+        return self.recording.to_rerun(path)
+
+    def _heading(self) -> str:
+        return "Recording of the emulated board"
+
+    def _facts(self) -> list[tuple[str, str]]:
+        counts = [(name, str(getattr(self.stream, name))) for name in ("samples", "lost", "corrupt")]
+        return counts + ([] if self.identity is None else [("firmware", self.identity.firmware)])
+
+    def _notes(self) -> tuple[str, ...]:
+        return self.warnings
+
+    def _panels(self) -> list[Panel]:
+        return self.recording._panels()
 
 
 def typical_chips(seed: int) -> tuple[Adxl345Options, ...]:

@@ -11,13 +11,16 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import tomli_w
+from numpy.typing import NDArray
 
 from firmware_bridge.lpc1768.elf import ElfImage
 from gfimu.errors import GfimuError, InputError, did_you_mean
 from gfimu.files.atomic_file import atomic_path, write_text
 from gfimu.optional_packages import require
+from gfimu.results import TableResult, one_row
 
 __all__ = [
     "ARRAY_SYMBOL",
@@ -59,7 +62,7 @@ _UNPROTECTED = b"\xff\xff\xff\xff"
 
 
 @dataclass(frozen=True)
-class BuildReport:
+class BuildReport(TableResult):
     """One built image.
 
     Parameters
@@ -90,6 +93,27 @@ class BuildReport:
     data_bytes: int
     bss_bytes: int
     defines: Mapping[str, str] = field(default_factory=dict)
+
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """Return one row: files, hashes, compiler, bytes of flash and memory."""
+        return one_row({name: value for name, value in vars(self).items() if name != "defines"})
+
+    def _heading(self) -> str:
+        return f"Image {self.name}"
+
+    def _facts(self) -> list[tuple[str, str]]:
+        return [
+            ("compiler", self.compiler),
+            ("code and constants", f"{self.text_bytes} bytes of flash"),
+            ("memory", f"{self.data_bytes + self.bss_bytes} bytes, and the stack"),
+            ("SHA-256", self.sha256),
+            ("ELF file", str(self.elf)),
+            ("image for the flash", str(self.binary)),
+            *self.defines.items(),
+        ]
+
+    def _shown(self) -> None:
+        return None
 
 
 def image_path(name: str = "gfimu") -> Path:

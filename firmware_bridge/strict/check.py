@@ -10,10 +10,14 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from firmware_bridge.loop.board_process import require_emulator
 from firmware_bridge.strict.findings import Finding
 from firmware_bridge.strict.image import load_image
 from gfimu.errors import GfimuError, InputError
+from gfimu.results import TableResult, text_column
 
 __all__ = ["CheckOptions", "CheckReport", "check_image"]
 
@@ -55,7 +59,7 @@ class CheckOptions:
 
 
 @dataclass(frozen=True)
-class CheckReport:
+class CheckReport(TableResult):
     """What came of a check.
 
     Parameters
@@ -102,6 +106,42 @@ class CheckReport:
     def faults(self) -> int:
         """Findings that are faults."""
         return sum(finding.severity == "fault" for finding in self.findings)
+
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """Return one row per finding: rule, severity, where, how often, what to do, and the document that says so."""
+        texts = {
+            key: text_column(getattr(one, key) for one in self.findings)
+            for key in ("rule", "severity", "what", "symbol", "remedy", "source")
+        }
+        return {
+            **{key: texts.pop(key) for key in ("rule", "severity")},
+            "count": np.array([one.count for one in self.findings], dtype=int),
+            "time_s": np.array([one.time_s for one in self.findings], dtype=float),
+            "pc": text_column(f"{one.pc:#x}" for one in self.findings),
+            **texts,
+        }
+
+    def _heading(self) -> str:
+        return f"{self.image} on the strict board"
+
+    def _facts(self) -> list[tuple[str, str]]:
+        counts = [(name, str(getattr(self, name))) for name in ("accesses", "exceptions", "resets")]
+        sent = [
+            (f"sent by UART{n}", f"{count} bytes, {self.baud[n]:.0f} baud {self.character[n]}")
+            for n, count in enumerate(self.sent)
+            if count
+        ]
+        stack = f"{self.stack_bytes} of {self.stack_room} bytes used"
+        return [
+            ("virtual time", f"{self.virtual_s:.4g} s"),
+            *counts,
+            *sent,
+            *([] if self.stack_room is None else [("main stack", stack)]),
+        ]
+
+    def _notes(self) -> tuple[str, ...]:
+        rules = () if self.findings else ("No rule is broken.",)
+        return (*rules, *((f"The run ended early: {self.ended}.",) if self.ended else ()))
 
 
 def check_image(image: str | Path = "gfimu", options: CheckOptions | None = None) -> CheckReport:

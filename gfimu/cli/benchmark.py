@@ -197,13 +197,13 @@ def _table(
 
 def _print(found: Judgement) -> None:
     """Print a table per set, a column per method."""
-    from sim.benchmark.table import COLUMNS
+    from sim.benchmark.table import COLUMNS, POINTS_NOTE
 
     for name in dict.fromkeys(one.set_name for one in found.summaries):
         columns = [one.row()[1:] for one in found.summaries if one.set_name == name]
         first, *rows = zip(COLUMNS[1:], *columns, strict=True)
         print_table(name, first, rows)
-    print_text("points: right 1, in part or in a set 0.5 or less, unknown 0.25, missed 0, wrong name or false alarm -1")
+    print_text(POINTS_NOTE)
 
 
 def _shown(title: str, show: Any) -> Callable[[int, int], None]:

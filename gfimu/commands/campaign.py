@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from numpy.typing import NDArray
 
 from gfimu.files.outputs import OutputFolder, writes
-from gfimu.results import Panel, PlottedResult, result_html
+from gfimu.results import Panel, PlottedResult
 
 if TYPE_CHECKING:
     from sim.sweep.summary import Group
@@ -60,15 +60,14 @@ class CampaignResult(PlottedResult):
         return f"Campaign in {self.folder}"
 
     def _facts(self) -> list[tuple[str, str]]:
-        return [
-            ("cases done", f"{self.done} of {self.cases}"),
-            *((why, f"{n} failed") for why, n in self.failures.items()),
-        ]
+        from gfimu.commands.campaign_views import progress_facts
 
-    def _repr_html_(self) -> str:
+        return progress_facts(self.cases, self.done, self.failures)
+
+    def _shown(self) -> dict[str, NDArray[Any]]:
         from gfimu.commands.campaign_views import group_columns
 
-        return result_html(self._heading(), self._facts(), group_columns(self.groups))
+        return group_columns(self.groups)
 
     def _panels(self) -> list[Panel]:
         from gfimu.commands.campaign_views import group_panels

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.files.outputs import OutputFile, writes
-from gfimu.results import Panel, PlottedResult, Series, text_column
+from gfimu.results import Panel, PlottedResult, Series, TableResult, one_row, text_column
 
 if TYPE_CHECKING:
     from sim.sweep.pace import Run
@@ -23,7 +23,7 @@ __all__ = ["CampaignStatus", "CampaignTable", "campaign_plot", "campaign_status"
 
 
 @dataclass(frozen=True)
-class CampaignStatus:
+class CampaignStatus(TableResult):
     """Progress of a campaign: cases done, failed and to come.
 
     Parameters
@@ -58,6 +58,22 @@ class CampaignStatus:
     def left_s(self) -> float:
         """Time until it is done, s; NaN where nothing runs it, or no batch has come yet."""
         return (self.cases - self.done) / self.rate_per_s if self.rate_per_s else math.nan
+
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """Return one row: cases, those done and failed, cases per second, time left."""
+        numbers = {"cases": self.cases, "done": self.done, "failed": sum(self.failures.values())}
+        return one_row({"folder": self.folder, **numbers, "rate_per_s": self.rate_per_s, "left_s": self.left_s})
+
+    def _heading(self) -> str:
+        return f"Progress of the campaign in {self.folder}"
+
+    def _facts(self) -> list[tuple[str, str]]:
+        facts = progress_facts(self.cases, self.done, self.failures)
+        facts += [(f"process {run.pid} on {run.host}", f"{run.rate_per_s:.3g} cases/s") for run in self.runs]
+        return facts if math.isnan(self.left_s) else [*facts, ("time left", f"{self.left_s:.3g} s")]
+
+    def _shown(self) -> None:
+        return None
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content for JSON."""
@@ -124,6 +140,11 @@ class CampaignTable(PlottedResult):
 _PICTURE = OutputFile(
     "a picture", (".png", ".svg", ".html"), dict.fromkeys((".png", ".svg", ".html"), ("matplotlib",)), any_case=True
 )
+
+
+def progress_facts(cases: int, done: int, failures: Mapping[str, int]) -> list[tuple[str, str]]:
+    """Return how many cases of a campaign are done, and how many failed by the reason, in words."""
+    return [("cases done", f"{done} of {cases}"), *((why, f"{count} failed") for why, count in failures.items())]
 
 
 def group_columns(groups: Sequence[Group]) -> dict[str, NDArray[Any]]:

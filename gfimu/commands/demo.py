@@ -7,9 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from numpy.typing import NDArray
+
 from gfimu.commands.diagnose import FOLDER as DIAGNOSIS
 from gfimu.files.outputs import OutputFolder, check_outputs, writes
 from gfimu.optional_packages import require
+from gfimu.results import TableResult, text_column
 
 if TYPE_CHECKING:
     from gfimu.commands.demo_steps import Row
@@ -21,7 +24,7 @@ FOLDER = OutputFolder(("run.parquet", "estimate.parquet", "calibration.json", "r
 
 
 @dataclass(frozen=True)
-class DemoResult:
+class DemoResult(TableResult):
     """Results of the demo, and the files that it wrote.
 
     Parameters
@@ -42,6 +45,17 @@ class DemoResult:
     seed: int
     rows: tuple[Row, ...]
     files: Mapping[str, Path]
+
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """Return one row per question: the answer, and what to compare it with."""
+        keys = {"what": "what", "result": "result", "to_compare": "beside"}
+        return {name: text_column(getattr(row, key) for row in self.rows) for name, key in keys.items()}
+
+    def _heading(self) -> str:
+        return f"The paper's experiment in simulation (seed {self.seed})"
+
+    def _notes(self) -> tuple[str, ...]:
+        return tuple(f"{meaning}: {path}" for meaning, path in self.files.items())
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of ``gfimu demo --json``."""

@@ -5,17 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, overload
+from typing import TYPE_CHECKING, Any, overload
+
+from numpy.typing import NDArray
 
 from gfimu.commands.former_arguments import former_arguments
 from gfimu.errors import InputError
 from gfimu.files.outputs import RECORDING, TRACE, OutputFolder, writes
 from gfimu.optional_packages import require
+from gfimu.results import TableResult, one_row
 
 if TYPE_CHECKING:
     from firmware_bridge.loop.board_process import BoardProcess
-    from firmware_bridge.loop.fault_campaign import FaultOutcome
-    from firmware_bridge.loop.selftest import SelfTestRow
+    from firmware_bridge.loop.fault_campaign import FaultReport
+    from firmware_bridge.loop.selftest import SelfTestReport
     from firmware_bridge.loop.virtual_port import ServeReport
     from firmware_bridge.loop.virtual_run import VirtualRun
     from firmware_bridge.lpc1768.build import BuildReport
@@ -31,7 +34,7 @@ IMAGES = OutputFolder(("gfimu.elf", "gfimu.bin", "gfimu.toml", "selfcheck.elf", 
 
 
 @dataclass(frozen=True)
-class TraceCounts:
+class TraceCounts(TableResult):
     """What a trace holds.
 
     Parameters
@@ -47,6 +50,13 @@ class TraceCounts:
     events: int
     accesses: int
     exceptions: int
+
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """Return one row of the counts."""
+        return one_row(vars(self))
+
+    def _heading(self) -> str:
+        return "Trace of the firmware"
 
 
 @overload
@@ -214,7 +224,7 @@ def build(
     return build_image(image, out, array=array, defines={**speed, **(define or {})})
 
 
-def selftest() -> list[SelfTestRow]:
+def selftest() -> SelfTestReport:
     """Check the emulator and the firmware: interrupts, the chips' self-test, the image, both ways of running."""
     from firmware_bridge.loop.selftest import run_selftest
 
@@ -268,7 +278,7 @@ def trace(
     )
 
 
-def faults(*, seed: int = 0, progress: Callable[[float], None] | None = None) -> list[FaultOutcome]:
+def faults(*, seed: int = 0, progress: Callable[[float], None] | None = None) -> FaultReport:
     """Break the wire, the supply and the chips, one after another, and return what the host makes of it."""
     from firmware_bridge.loop.fault_campaign import run_campaign
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.commands.former_arguments import former_arguments
-from gfimu.results import Panel, PlottedResult, Series, result_html
+from gfimu.results import Panel, PlottedResult, Series
 from gfimu.short_repr import joined
 
 if TYPE_CHECKING:
@@ -113,12 +113,10 @@ class Scores(PlottedResult):
     def _heading(self) -> str:
         return "Scores"
 
-    def _repr_html_(self) -> str:
+    def _shown(self) -> dict[str, NDArray[Any]]:
         columns = self.to_columns()
         shown = _COLUMNS if self.rigid else tuple(columns)
-        return result_html(
-            self._heading(), [], {name: columns[name] for name in shown if name in columns}, self._notes()
-        )
+        return {name: columns[name] for name in shown if name in columns}
 
     def _notes(self) -> tuple[str, ...]:
         from gfimu.geometry.scoring import ranking_remark

@@ -20,7 +20,7 @@ from gfimu.errors import InputError
 from gfimu.geometry.array import OMEGA_PRODUCTS, AccelerometerArray
 from gfimu.geometry.dilution import gdop, gdop_lower_bound
 from gfimu.geometry.kinematics import MOTION_NAMES, joint_covariance, null_space, omega_leakage, require_all_motions
-from gfimu.results import Panel, PlottedResult, Series, result_html
+from gfimu.results import Panel, PlottedResult, Series
 from gfimu.short_repr import short_repr
 
 __all__ = [
@@ -158,8 +158,8 @@ class Score(PlottedResult):
             ("channel noise of that bound", f"{self.noise_m_s2:g} m/s²"),
         ]
 
-    def _repr_html_(self) -> str:
-        return result_html(self._heading(), self._facts(), None)
+    def _shown(self) -> None:
+        return None
 
     def _panels(self) -> list[Panel]:
         return score_panels([self])

@@ -15,6 +15,7 @@ from gfimu.joining.alignment import align
 from gfimu.joining.reference_file import ReferenceSeries
 from gfimu.joining.signals import Alignment, Signals, functions_of, uniform
 from gfimu.recording import Recording
+from gfimu.results import Panel, PlottedResult, Series, text_column
 from gfimu.units import TIME_COLUMNS
 
 __all__ = ["FAR", "Joined", "grids", "join_reference"]
@@ -35,7 +36,7 @@ FAR = 0.3
 
 
 @dataclass(frozen=True)
-class Joined:
+class Joined(PlottedResult):
     """A recording with its reference on one clock, and the standard deviation of the clock's offset and rate.
 
     Parameters
@@ -104,6 +105,40 @@ class Joined:
             "rate_error_std": found.rate_error_std,
         }
 
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """Return one row per channel: the share of its variance that the reference explains."""
+        explained = self._explained()
+        return {"channel": text_column(explained), "explained_share": np.array([*explained.values()])}
+
+    def _explained(self) -> dict[str, float]:
+        return dict(zip(self.recording.channels, self.alignment.explained.tolist(), strict=False))
+
+    def _heading(self) -> str:
+        return "Two clocks"
+
+    def _facts(self) -> list[tuple[str, str]]:
+        found = self.alignment
+        facts = [
+            ("time of the channels where the reference reads 0", f"{found.offset:.6g} ± {found.offset_std:.2g} s"),
+            ("rate error of the clocks", f"{100 * found.rate_error:.4g} ± {100 * found.rate_error_std:.2g} %"),
+            ("common time", f"{found.overlap_s:.5g} s"),
+            ("log odds over the next offset", f"{self.odds_over_second:.0f} nats"),
+            ("log odds over shuffled references", f"{self.odds_over_foreign:.0f} nats"),
+        ]
+        levers = self.levers_m.items()
+        return facts + [
+            (f"distance of chip {chip} from the axis, by ω² and by α", f"{1e3 * a:.4g} and {1e3 * b:.4g} mm")
+            for chip, (a, b) in levers
+        ]
+
+    def _notes(self) -> tuple[str, ...]:
+        return tuple(f"In doubt: {doubt}." for doubt in self.doubts)
+
+    def _panels(self) -> list[Panel]:
+        explained = self._explained()
+        shares = Series("", 100.0 * np.array([*explained.values()]))
+        return [Panel("explained by the reference", "share of variance, %", (shares,), tuple(explained), scale="zero")]
+
     def to_dict(self) -> dict[str, Any]:
         """Return the figures as JSON holds them."""
         found = self.alignment
@@ -113,7 +148,7 @@ class Joined:
             "rate_error": found.rate_error,
             "rate_error_std": found.rate_error_std,
             "overlap_s": found.overlap_s,
-            "explained": dict(zip(self.recording.channels, found.explained.tolist(), strict=False)),
+            "explained": self._explained(),
             "second_offset_s": found.second_offset,
             "log_odds_over_second": self.odds_over_second,
             "log_odds_over_foreign": self.odds_over_foreign,

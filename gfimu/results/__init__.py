@@ -5,7 +5,7 @@ A result describes itself once, as columns, facts and panels; tables, pages and 
 
 from gfimu.results.figure import drawn_chips
 from gfimu.results.html import result_html
-from gfimu.results.panels import Panel, Series, axis_series, text_column
+from gfimu.results.panels import Panel, Series, axis_series, one_row, text_column
 from gfimu.results.result import PlottedResult, RunResult, TableResult
 
 __all__ = [
@@ -16,6 +16,7 @@ __all__ = [
     "TableResult",
     "axis_series",
     "drawn_chips",
+    "one_row",
     "result_html",
     "text_column",
 ]

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["OF_TIME", "Panel", "Series", "axis_series", "text_column"]
+__all__ = ["OF_TIME", "Panel", "Series", "axis_series", "one_row", "text_column"]
 
 OF_TIME = "time, s"
 """Label along a line over time."""
@@ -86,6 +87,16 @@ def axis_series(
         Series(name, values[:, place], None if std is None else std[:, place], role="xyz"[place])
         for place, name in enumerate(names)
     )
+
+
+def one_row(values: Mapping[str, object]) -> dict[str, NDArray[Any]]:
+    """Return values as a table of one row, by name with unit; what is no number is text, and empty where it is None."""
+    return {
+        name: np.array([value])
+        if isinstance(value, int | float)
+        else text_column(["" if value is None else str(value)])
+        for name, value in values.items()
+    }
 
 
 def text_column(values: Iterable[str]) -> NDArray[np.object_]:

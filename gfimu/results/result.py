@@ -96,10 +96,13 @@ class TableResult(ABC):
         """Return sentences that belong to it: warnings, a verdict in words."""
         return ()
 
-    def _repr_html_(self) -> str:
+    def _shown(self) -> Mapping[str, NDArray[Any]] | None:
+        """Return the columns of the notebook's table; None for samples, or where the facts suffice."""
         columns = self.to_columns()
-        shown = None if "t_s" in columns else columns  # samples are for a picture
-        return result_html(self._heading(), self._facts(), shown, self._notes())
+        return None if "t_s" in columns else columns
+
+    def _repr_html_(self) -> str:
+        return result_html(self._heading(), self._facts(), self._shown(), self._notes())
 
 
 class PlottedResult(TableResult):

@@ -13,13 +13,25 @@ from scipy.stats import binomtest, norm
 from sim.benchmark.judge import Judged
 from sim.benchmark.release import SETS
 
-__all__ = ["COLUMNS", "Share", "Summary", "markdown", "summaries"]
+__all__ = ["COLUMNS", "POINTS_NOTE", "Share", "Summary", "markdown", "summaries"]
 
 COLUMNS = (
     *("set", "method", "worlds", "points", "named alone %", "in a set %", "wrong name %", "unknown %", "missed %"),
     *("false alarm %", "removed", "within 1σ, 2σ %", "processor s"),
 )
 """Heads of the table."""
+
+POINTS_NOTE = "points: right 1, in part or in a set 0.5 or less, unknown 0.25, missed 0, wrong name or false alarm -1"
+"""What the points mean, below the table."""
+
+_SHARES = {
+    "named_alone": ("alone",),
+    "in_a_set": ("set", "part"),
+    "wrong_name": ("wrong",),
+    "unknown": ("unknown", "error"),
+    "missed": ("missed",),
+}
+"""Outcomes that each share counts, of worlds with something hidden."""
 
 MEASURED_OUTCOMES = frozenset({"measured", "contradicted"})
 """Outcomes of measured data, which have no truth to share in."""
@@ -42,6 +54,11 @@ class Share:
     cases: int
 
     @property
+    def value(self) -> float:
+        """The share; NaN without cases."""
+        return self.hits / self.cases if self.cases else float("nan")
+
+    @property
     def interval(self) -> tuple[float, float]:
         """95 % interval of Clopper and Pearson (Biometrika 26:404, 1934); 0 to 1 without cases."""
         if not self.cases:
@@ -53,7 +70,7 @@ class Share:
         if not self.cases:
             return "–"
         low, high = self.interval
-        return f"{100 * self.hits / self.cases:.0f} ({100 * low:.0f}–{100 * high:.0f})"
+        return f"{100 * self.value:.0f} ({100 * low:.0f}–{100 * high:.0f})"
 
 
 @dataclass(frozen=True)
@@ -79,11 +96,22 @@ class Summary:
         return Share(sum(one.outcome in outcomes for one in chosen), len(chosen))
 
     @property
-    def points(self) -> tuple[float, float]:
-        """Mean of the points and half its 95 % interval, by the central limit."""
+    def shares(self) -> dict[str, Share]:
+        """Shares of the table by name; of a false alarm among worlds with nothing hidden."""
+        found = {name: self.share(*outcomes) for name, outcomes in _SHARES.items()}
+        return {**found, "false_alarm": self.share("false_alarm", nothing=True)}
+
+    @property
+    def points_std(self) -> float:
+        """Standard deviation of the mean of the points, by the central limit; NaN of a single world."""
         values = np.array([one.points for one in self.judged])
-        spread = float(values.std(ddof=1) / np.sqrt(len(values))) if len(values) > 1 else float("nan")
-        return float(values.mean()), float(norm.ppf(0.5 + _LEVEL / 2)) * spread
+        return float(values.std(ddof=1) / np.sqrt(len(values))) if len(values) > 1 else float("nan")
+
+    @property
+    def points(self) -> tuple[float, float]:
+        """Mean of the points and half its 95 % interval."""
+        mean = float(np.mean([one.points for one in self.judged]))
+        return mean, float(norm.ppf(0.5 + _LEVEL / 2)) * self.points_std
 
     @property
     def removed(self) -> tuple[float, int, int]:
@@ -135,12 +163,7 @@ class Summary:
             self.method,
             str(len(self.judged)),
             "–" if np.isnan(mean) else f"{mean:+.2f}" + ("" if np.isnan(half) else f" ± {half:.2f}"),
-            str(self.share("alone")),
-            str(self.share("set", "part")),
-            str(self.share("wrong")),
-            str(self.share("unknown", "error")),
-            str(self.share("missed")),
-            str(self.share("false_alarm", nothing=True)),
+            *map(str, self.shares.values()),
             removal,
             sizes if one.cases else "–",
             "–" if np.isnan(self.processor_s) else f"{self.processor_s:.2g}",

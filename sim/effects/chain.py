@@ -68,6 +68,7 @@ class ProofMass(Effect):
     :example: resonance_hz = 60.0, damping_ratio = 0.3
     :experiment: Tap the resting unit and sample at more than twice the resonance: the reading oscillates at it. Far
         below the resonance only the lag 2ζ/ω₀ is seen.
+    :rivals: A diagnosis looks for ``sensor_lag`` in its place, whose page has the rivals.
     """
 
     name = "proof_mass"

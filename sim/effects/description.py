@@ -10,6 +10,7 @@ Notes
     :example: a11_m_s2 = 0.2
     :experiment: how a lab separates it from its rivals
     :recordings: where it was seen in measured data (left out where it was not)
+    :rivals: how a diagnosis finds it, where it has no column in the standard motions (left out where it has)
 
 The formula is text and Python at once (`docs/scripts/effect_formulas.py` has its grammar): it is printed as it stands,
 typeset on the page, and evaluated by a test that compares it with the simulation.
@@ -25,10 +26,13 @@ from typing import Any
 
 from gfimu.errors import InputError
 
-__all__ = ["FIELDS", "Description", "describe"]
+__all__ = ["FIELDS", "OPTIONAL_FIELDS", "Description", "describe"]
 
-FIELDS = ("formula", "symbols", "size", "example", "experiment", "recordings")
-"""Fields of the notes; the last one may be left out."""
+FIELDS = ("formula", "symbols", "size", "example", "experiment")
+"""Fields that the notes of every effect have."""
+
+OPTIONAL_FIELDS = ("recordings", "rivals")
+"""Fields that may be left out."""
 
 _FIELD = re.compile(r"^:(\w+):[ \n]", re.MULTILINE)
 
@@ -55,6 +59,8 @@ class Description:
         How a lab separates it from its rivals.
     recordings : str
         Where it was seen in measured data; empty where it was not.
+    rivals : str
+        How a diagnosis finds it, where no rivals can be computed; empty where they can.
     """
 
     title: str
@@ -65,6 +71,7 @@ class Description:
     example: dict[str, Any]
     experiment: str
     recordings: str
+    rivals: str
 
 
 def describe(effect: type) -> Description:
@@ -86,12 +93,13 @@ def describe(effect: type) -> Description:
     paragraphs = [" ".join(one.split()) for one in head.split("\n\n") if one.strip()]
     parts = _FIELD.split("\n" + notes)
     fields = dict(zip(parts[1::2], parts[2::2], strict=True))
-    missing = [name for name in FIELDS[:-1] if name not in fields]
+    missing = [name for name in FIELDS if name not in fields]
     if len(paragraphs) < 2 or missing:
         what = f"the field :{missing[0]}:" if missing else "a paragraph that says what it is"
         raise InputError(f"{where}: lacks {what}; see sim/effects/description.py")
-    if unknown := [name for name in fields if name not in FIELDS]:
-        raise InputError(f"{where}: unknown field :{unknown[0]}:; valid: {', '.join(FIELDS)}")
+    valid = (*FIELDS, *OPTIONAL_FIELDS)
+    if unknown := [name for name in fields if name not in valid]:
+        raise InputError(f"{where}: unknown field :{unknown[0]}:; valid: {', '.join(valid)}")
     flat = {name: " ".join(value.split()) for name, value in fields.items()}
     try:
         example = tomllib.loads(f"example = {{{flat['example']}}}")["example"]
@@ -106,6 +114,7 @@ def describe(effect: type) -> Description:
         example,
         flat["experiment"],
         flat.get("recordings", ""),
+        flat.get("rivals", ""),
     )
 
 

@@ -61,6 +61,8 @@ class Noise(_Discrete):
     :experiment: Record a long rest and compare with the data sheet (`gfimu noise`). At rest on foam, vibration of the
         bench is gone and noise of the chip stays.
     :recordings: MIMU4444: the channels' noise at rest is 0.037 m/s² rms.
+    :rivals: It changes the scatter of the readings and not their mean. A diagnosis estimates the white noise in its
+        fit, and names this effect where the noise of all channels exceeds the data sheet's.
     """
 
     name = "noise"
@@ -90,6 +92,8 @@ class BiasRandomWalk(_Discrete):
         right end rises as √τ. An offset that follows the temperature is explained by a thermometer on the chip.
     :recordings: MIMU4444: z biases with 0.3 mm/s²/√s make the poses of one recording agree with their predictions
         (variance factor 1.0); the figure was chosen on these recordings.
+    :rivals: It changes the spectrum of the noise and not the mean of the readings. A diagnosis compares models of the
+        noise with and without it by their evidence.
     """
 
     name = "bias_random_walk"
@@ -323,6 +327,7 @@ class DroppedFrames(_Discrete):
     :example: share = 0.02
     :experiment: Record at half the rate or over a faster link: gaps by overload disappear.
     :recordings: MIMU4444: none in ten minutes.
+    :rivals: A diagnosis finds the gaps in the time stamps before any fit.
     """
 
     name = "dropped_frames"

@@ -159,6 +159,8 @@ class AngleZero(Effect):
     :size: 0.02 rad, by choice.
     :example: offset_rad = 0.02
     :experiment: Let the pendulum hang at rest and read the encoder; repeat at several angles.
+    :rivals: It shows where the axis is inclined and the reference is an angle. The table of the standard motions has an
+        upright axis and a tachometer.
     """
 
     name = "angle_zero"

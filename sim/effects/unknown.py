@@ -37,6 +37,8 @@ class Unknown(Effect):
     :example: dependence = 'rate', rate_unit_rad_s = 10.0, a11_m_s2 = 0.1, a22_m_s2 = -0.05
     :experiment: Record another run with another motion. What stays the same function of the motion is in the rig or the
         sensors; what does not is an event.
+    :rivals: A diagnosis adds it last, where the causes that it found leave a lack of fit. Its functions are then chosen
+        one by one, where they make the data most probable.
     """
 
     name = "unknown"

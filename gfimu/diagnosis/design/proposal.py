@@ -7,11 +7,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 import tomli_w
+from numpy.typing import NDArray
 
 from gfimu.diagnosis.design.distinguishability import Distinguishability, PlannedRun
 from gfimu.diagnosis.design.profile_search import Limits
 from gfimu.diagnosis.design.table_profile import TableProfile
+from gfimu.results import Panel, PlottedResult, Series, text_column
 from gfimu.short_repr import short_repr
 from gfimu.world_model import WorldModel
 
@@ -20,9 +23,11 @@ __all__ = ["SEPARATED", "Proposal", "in_words", "scenario_of"]
 SEPARATED = 12.0
 """D_ij from which on two effects are distinguished with confidence, nats: odds of 10⁵, less what the prior costs."""
 
+_FIGURES = ("nats_before", "nats_after", "unexplained_before", "unexplained_after")
+
 
 @dataclass(frozen=True)
-class Proposal:
+class Proposal(PlottedResult):
     """A proposed experiment: the profile or mounting that best separates effects.
 
     Parameters
@@ -73,9 +78,43 @@ class Proposal:
         """Return the scenario file, which ``gfimu simulate`` accepts."""
         return tomli_w.dumps(self.scenario)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON form."""
-        pairs = [
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """Return one row per effect and rival: nats and unexplained share, before and after the experiment."""
+        pairs = self._pairs()
+        columns: dict[str, NDArray[Any]] = {
+            key: text_column(pair[key] for pair in pairs) for key in ("effect", "rival")
+        }
+        return columns | {key: np.array([pair[key] for pair in pairs]) for key in _FIGURES}
+
+    def _heading(self) -> str:
+        return f"Experiment to separate {', '.join(self.effects)}"
+
+    def _facts(self) -> list[tuple[str, str]]:
+        turned = ", ".join(f"{one:.3g}" for one in self.mounting)
+        return [
+            ("mounting", f"turned by ({turned}) rad from upright" if any(self.mounting) else "upright"),
+            ("duration", f"{self.profile.duration:.4g} s"),
+            ("largest rate", f"{self.profile.peak_rate:.3g} rad/s"),
+            ("largest angular acceleration", f"{self.profile.peak_acceleration:.3g} rad/s²"),
+            ("weakest margin", f"{self.after.least_nats:.3g} nats, {SEPARATED:g} needed"),
+        ]
+
+    def _notes(self) -> tuple[str, ...]:
+        return (self.text,)
+
+    def _panels(self) -> list[Panel]:
+        t = np.linspace(0.0, self.profile.duration, 1000)
+        profile = Panel("profile of the table", "rate, rad/s", (Series("", self.profile.at(t).rate),), t)
+        columns = self.to_columns()
+        names = tuple(f"{one}, not {other}" for one, other in zip(columns["effect"], columns["rival"], strict=True))
+        margins = tuple(  # a logarithmic axis has no zero
+            Series(when, np.maximum(columns[f"nats_{when}"], 0.1), role=when) for when in ("before", "after")
+        )
+        needed = Series("needed", np.full(len(names), SEPARATED), role="noise")
+        return [profile, Panel("margin over each rival", "nats", (*margins, needed), names, scale="log")]
+
+    def _pairs(self) -> list[dict[str, Any]]:
+        return [
             {
                 "effect": one,
                 "rival": other,
@@ -88,6 +127,9 @@ class Proposal:
             for j, other in enumerate(self.effects)
             if i != j
         ]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON form."""
         return {
             "effects": list(self.effects),
             "separates": self.separates,
@@ -100,7 +142,7 @@ class Proposal:
             "segments": self.profile.to_segments(),
             "detectability_before": self.before.detectability.tolist(),
             "detectability_after": self.after.detectability.tolist(),
-            "pairs": pairs,
+            "pairs": self._pairs(),
             "text": self.text,
         }
 

@@ -18,7 +18,7 @@ from gfimu.errors import GeometryError
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.geometry.turning_axis import TurningAxis
 from gfimu.known_axis.channels import AxisChannels
-from gfimu.results import Panel, PlottedResult, Series, result_html, text_column
+from gfimu.results import Panel, PlottedResult, Series, text_column
 
 if TYPE_CHECKING:
     from gfimu.known_axis.accuracy.predicted import PredictedEstimate
@@ -85,8 +85,8 @@ class AxisBounds(PlottedResult):
             ("σ of the rate, filter that has settled", f"{self.filter_std:.3g} rad/s"),
         ]
 
-    def _repr_html_(self) -> str:
-        return result_html(self._heading(), self._facts(), None)
+    def _shown(self) -> None:
+        return None
 
     def _panels(self) -> list[Panel]:
         values = np.array([self.sample_std, self.filter_std])
