@@ -375,7 +375,7 @@ BESIDE = {"gfimu.diagnosis.policy", "gfimu.generic_basis", "gfimu.geometry.array
 """What every room of the diagnosis may import besides."""
 
 OUTSIDE = {
-    "data": {"gfimu.recording", "gfimu.motion.body_drive"},
+    "data": {"gfimu.importing.guessing.likely_reference", "gfimu.recording", "gfimu.motion.body_drive"},
     "terms": {"gfimu.motion.body_drive"},
     "criticism": {"gfimu.geometry.kinematics"},
     "design": {"gfimu.recording", "gfimu.importing.oddities"},

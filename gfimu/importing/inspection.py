@@ -13,13 +13,14 @@ from numpy.typing import NDArray
 from gfimu.errors import InputError
 from gfimu.importing.clock import Times, times_of
 from gfimu.importing.column_map import ColumnMap, TextSpec, TimeSpec, map_toml
+from gfimu.importing.guessing.likely_reference import likely_references
 from gfimu.importing.guessing.suggestion import roles_by_map, suggest, with_shipped
 from gfimu.importing.oddities import oddities
 from gfimu.importing.raw_table import RawFile, RawTable
 from gfimu.importing.readers import read_foreign
 from gfimu.importing.recognise import fitting_maps, own_chips
 from gfimu.results import TableResult, text_column
-from gfimu.units import REFERENCE_UNITS, TIME_COLUMNS
+from gfimu.units import REFERENCE_UNITS, TIME_COLUMNS, reference_quantity
 
 __all__ = ["ColumnView", "Inspection", "inspect_file"]
 
@@ -210,7 +211,12 @@ def _own_recording(raw: RawFile, table: RawTable, chips: dict[str, list[str]]) -
     channels = [name for names in chips.values() for name in names]
     roles = {name: f"{name.partition('_')[0]}, {name.partition('_')[2]}" for name in channels} | {"t_s": "time"}
     roles |= {name: "reference" for name in table.columns if _is_reference(name) and name != "t_s"}
+    have = {reference_quantity(name) for name, role in roles.items() if role == "reference"}
+    further = {name: values for name, values in table.columns.items() if name not in roles}
+    likely = [one for one in likely_references(further) if reference_quantity(one.reference) not in have]
+    roles |= {one.column: f"{reference_quantity(one.reference)}? {one.unit}" for one in likely}
     times, findings = _times(table, TimeSpec("t_s"), raw.source, drop=("duplicates", "unordered"))
+    findings += [f"{one.reference} is not there; {one.remedy}" for one in likely]
     if times is not None and times.dropped:
         findings.append("with such rows it is refused; gfimu convert --drop duplicates,unordered leaves them out")
     findings += oddities({name: table.numbers(name) for name in channels})

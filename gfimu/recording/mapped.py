@@ -17,7 +17,7 @@ from gfimu.errors import InputError, RecordingWarning
 from gfimu.files.table import ArrowStream, schema_metadata
 from gfimu.files.table_columns import TableColumns
 from gfimu.geometry.array import AccelerometerArray
-from gfimu.importing.column_map import ColumnMap, load_map
+from gfimu.importing.column_map import UNMAPPED, ColumnMap, load_map
 from gfimu.importing.piece import Piece, combined_file, merged_piece, piece_of
 from gfimu.importing.raw_table import RawFile, RawTable
 from gfimu.importing.readers import read_foreign
@@ -179,7 +179,7 @@ def _recording(piece: Piece, chosen: ColumnMap, array: AccelerometerArray | None
     columns |= {f"{name}_m_s2": values for name, values in zip(names, piece.channels.values(), strict=True)}
     columns |= dict(piece.reference)
     for name, values in piece.other.items():
-        columns[f"raw_{'_'.join(name.split())}"] = values
+        columns[f"{UNMAPPED}{'_'.join(name.split())}"] = values
     metadata: dict[str, Any] = {"column_map": chosen.name, "source_files": [Path(one).name for one in sources]}
     if piece.times.origin_s:
         metadata["time_origin_s"] = piece.times.origin_s
