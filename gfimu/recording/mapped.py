@@ -189,6 +189,6 @@ def _recording(piece: Piece, chosen: ColumnMap, array: AccelerometerArray | None
         metadata["dropped_rows"] = dict(piece.times.dropped)
     table = TableColumns(pa.table(dict(columns)).replace_schema_metadata(schema_metadata(metadata)))
     table.file = piece.source
-    recording = Recording.read(table, array=array)  # type: ignore[arg-type]
+    recording = replace(Recording.read(table, array=array), unit_from="column_map")  # type: ignore[arg-type]
     absent = np.column_stack([np.isnan(values) for values in piece.channels.values()])
     return without_rows(recording, chosen.drop, absent=absent, source=piece.source, array=array)

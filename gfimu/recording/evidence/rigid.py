@@ -182,6 +182,8 @@ class Evidence:
         Noise seen between neighbouring samples where they are quietest, m/s².
     sample_rate : float
         By the times as given, Hz.
+    unit_from : str
+        Which argument stated the unit of the readings (`gfimu.Recording`).
     """
 
     array: AccelerometerArray
@@ -193,6 +195,7 @@ class Evidence:
     up: NDArray[np.float64] | None
     quiet: NDArray[np.float64]
     sample_rate: float
+    unit_from: str = ""
     _cache: dict[str, _Matrices] = field(default_factory=dict)
 
     @property
@@ -439,7 +442,8 @@ def gather(recording: Recording, array: AccelerometerArray, limits: PartLimits, 
     longest = sorted(sorted(rests, key=lambda rest: rest.start - rest.stop)[:_RESTS], key=lambda rest: rest.start)
     means = np.array([readings[rest][whole[rest]].mean(axis=0) for rest in longest]).reshape(-1, array.n_channels)
     windows = _windows(recording, readings[:, alive], whole, rests)
-    return Evidence(array, alive, limits, means, covariance, windows, up, _quiet(readings), recording.sample_rate)
+    quiet, rate = _quiet(readings), recording.sample_rate
+    return Evidence(array, alive, limits, means, covariance, windows, up, quiet, rate, recording.unit_from)
 
 
 def _rests(
