@@ -19,9 +19,8 @@ from gfimu.files.table_columns import TableColumns
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.importing.column_map import UNMAPPED, ColumnMap, load_map
 from gfimu.importing.piece import Piece, combined_file, merged_piece, piece_of
-from gfimu.importing.raw_table import RawFile, RawTable
 from gfimu.importing.readers import read_foreign
-from gfimu.importing.readers.tables import arrow_table
+from gfimu.importing.readers.tables import table_file
 from gfimu.recording.carried_array import array_metadata
 from gfimu.recording.filtered import filtered_recording, rows_between, without_rows
 from gfimu.recording.recording import Recording
@@ -110,7 +109,7 @@ def mapped_recording(
         paths = [source] if isinstance(source, str | Path) else source
         files = [read_foreign(one, chosen.format, chosen.text) for one in paths]
     else:
-        files = [RawFile(TableColumns(source).file, "table", {"": _as_raw(source)})]
+        files = [table_file(source)]
     whole = combined_file(files, chosen)
     pieces = [piece_of(one, chosen) for one in (files if whole is None else [whole])]
     geometry = array or (AccelerometerArray.load(chosen.array) if chosen.array and len(pieces) == 1 else None)
@@ -147,11 +146,6 @@ def mapped_reference(
     for note in piece.times.notes:
         warnings.warn(note, RecordingWarning, stacklevel=2)
     return piece.times.t_s, dict(piece.reference), piece.times.origin_s
-
-
-def _as_raw(source: Any) -> RawTable:
-    table = pa.Table.from_pandas(source) if hasattr(source, "reset_index") else pa.table(source)
-    return arrow_table(table)
 
 
 def _between(piece: Piece, chosen: ColumnMap) -> Piece:
