@@ -2,7 +2,6 @@
 
 import numpy as np
 import pandas as pd
-import polars as pl
 import pyarrow as pa
 import pytest
 
@@ -13,13 +12,17 @@ T = np.arange(400) / 100.0
 LOG = pd.DataFrame({"millis": 1000.0 * T, "ax": 0.01 * np.sin(T), "ay": 0.02 * np.cos(T), "az": 1.0 + 0.001 * T})
 
 
-TABLES = {"pandas": LOG, "polars": pl.DataFrame(LOG.to_dict("list")), "pyarrow": pa.Table.from_pandas(LOG)}
+TABLES = {
+    "pandas": lambda: LOG,
+    "polars": lambda: pytest.importorskip("polars").DataFrame(LOG.to_dict("list")),
+    "pyarrow": lambda: pa.Table.from_pandas(LOG),
+}
 
 
 @pytest.mark.parametrize("kind", TABLES)
 def test_a_table_is_inspected_as_its_file(kind, tmp_path):
     LOG.to_csv(tmp_path / "log.csv", index=False)
-    seen, of_file = gfimu.inspect(TABLES[kind]), gfimu.inspect(tmp_path / "log.csv")
+    seen, of_file = gfimu.inspect(TABLES[kind]()), gfimu.inspect(tmp_path / "log.csv")
     assert seen.source.startswith(kind)
     assert [(one.name, one.role) for one in seen.columns] == [(one.name, one.role) for one in of_file.columns]
     assert seen.sample_rate_hz == pytest.approx(100.0)
