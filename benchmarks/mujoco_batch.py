@@ -21,7 +21,8 @@ import numpy as np  # noqa: E402
 
 from sim.rigs.dc_motor import DcMotor  # noqa: E402
 from sim.rigs.driven import Drive, drive_all  # noqa: E402
-from sim.scenarios import Scenario, simulate  # noqa: E402
+from sim.scenarios import Scenario  # noqa: E402
+from sim.simulation import simulate  # noqa: E402
 
 ROUNDS = 5
 

@@ -17,7 +17,8 @@ from sim import forward
 from sim.motions.profiles import Tumble, speed_sweep, spin_profile
 from sim.rigs.driven import drive
 from sim.rigs.turntable import prescribed_readings
-from sim.scenarios import Scenario, simulate
+from sim.scenarios import Scenario
+from sim.simulation import simulate
 from sim.world import World
 
 RATE = 100.0

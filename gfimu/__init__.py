@@ -71,10 +71,10 @@ if TYPE_CHECKING:
     from gfimu.commands.diagnose import diagnose as diagnose
     from gfimu.commands.diagnose import write_report as write_report
     from gfimu.commands.drift import Drift as Drift
-    from gfimu.commands.drift import EquivalentErrors as EquivalentErrors
     from gfimu.commands.drift import axis_drift as axis_drift
     from gfimu.commands.drift import drift as drift
-    from gfimu.commands.drift import drift_from_position as drift_from_position
+    from gfimu.commands.drift_from_position import EquivalentErrors as EquivalentErrors
+    from gfimu.commands.drift_from_position import drift_from_position as drift_from_position
     from gfimu.commands.drift_of_rest import drift_of_rest as drift_of_rest
     from gfimu.commands.estimate import estimate as estimate
     from gfimu.commands.impact import impact as impact
@@ -94,8 +94,8 @@ if TYPE_CHECKING:
     from gfimu.crash.event import Impact as Impact
     from gfimu.diagnosis.design.proposal import Proposal as Proposal
     from gfimu.diagnosis.design.run_check import RunCheck as RunCheck
+    from gfimu.diagnosis.verdict.parts import NamedCause as NamedCause
     from gfimu.diagnosis.verdict.verdict import Diagnosis as Diagnosis
-    from gfimu.diagnosis.verdict.verdict import NamedCause as NamedCause
     from gfimu.errors import CorruptValueWarning as CorruptValueWarning
     from gfimu.errors import GeometryError as GeometryError
     from gfimu.errors import GfimuError as GfimuError
@@ -125,9 +125,9 @@ if TYPE_CHECKING:
     from gfimu.motion.earth import EarthRotation as EarthRotation
     from gfimu.motion.equivalent_errors import equivalent_p_bias as equivalent_p_bias
     from gfimu.motion.equivalent_errors import equivalent_rate_drift as equivalent_rate_drift
+    from gfimu.motion.estimate import Estimate as Estimate
     from gfimu.motion.estimate_summary import centripetal_agreement as centripetal_agreement
     from gfimu.motion.estimate_summary import summarise as summarise
-    from gfimu.motion.estimation import Estimate as Estimate
     from gfimu.motion.navigation import level as level
     from gfimu.motion.navigation import navigate as navigate
     from gfimu.motion.rest_bias import estimate_from_rest as estimate_from_rest
@@ -176,9 +176,9 @@ _PUBLIC = {
     "DriftBudget": "gfimu.position_drift.budget",
     "DriftSample": "gfimu.position_drift.monte_carlo",
     "EarthRotation": "gfimu.motion.earth",
-    "EquivalentErrors": "gfimu.commands.drift",
+    "EquivalentErrors": "gfimu.commands.drift_from_position",
     "ErrorSources": "gfimu.position_drift.closed_forms",
-    "Estimate": "gfimu.motion.estimation",
+    "Estimate": "gfimu.motion.estimate",
     "Front": "gfimu.array_search.front",
     "GeometryError": "gfimu.errors",
     "GfimuError": "gfimu.errors",
@@ -189,7 +189,7 @@ _PUBLIC = {
     "LiveRateFilter": "gfimu.rate.live",
     "MappedFile": "gfimu.recording.mapped",
     "MissingPackageError": "gfimu.errors",
-    "NamedCause": "gfimu.diagnosis.verdict.verdict",
+    "NamedCause": "gfimu.diagnosis.verdict.parts",
     "NoiseModel": "gfimu.sensor_noise.identification",
     "Proposal": "gfimu.diagnosis.design.proposal",
     "RateEstimate": "gfimu.rate.result",
@@ -229,7 +229,7 @@ _PUBLIC = {
     "diagnose": "gfimu.commands.diagnose",
     "drift": "gfimu.commands.drift",
     "drift_budget": "gfimu.position_drift",
-    "drift_from_position": "gfimu.commands.drift",
+    "drift_from_position": "gfimu.commands.drift_from_position",
     "drift_of_rest": "gfimu.commands.drift_of_rest",
     "equivalent_p_bias": "gfimu.motion.equivalent_errors",
     "equivalent_rate_drift": "gfimu.motion.equivalent_errors",

@@ -19,6 +19,7 @@ from gfimu.world_model import BasisUnits, SpinState
 __all__ = [
     "FUNCTIONS",
     "OF_READING",
+    "UNIT_KEYS",
     "Motion",
     "basis_function",
     "is_of_time",
@@ -26,6 +27,7 @@ __all__ = [
     "ripples",
     "step_at",
     "tone",
+    "unit_parameters",
 ]
 
 Function = Callable[["Motion"], NDArray[np.float64]]
@@ -34,6 +36,9 @@ _TURNING = 0.05  # rad/s
 _ORDERS = (1, 2, 3, 4, 6, 8, 12)
 _SLOW = 10
 _STEPS = 16
+UNIT_KEYS = {"rate_unit_rad_s": "rad/s", "acceleration_unit_rad_s2": "rad/s²", "duration_s": "s"}
+"""Parameters of a term without a name that hold its `BasisUnits`, and their units."""
+
 OF_READING = "reading³"
 """The one function that is another one in every channel."""
 
@@ -145,6 +150,11 @@ def ripple_order(name: str) -> int | None:
 def step_at(time: float) -> str:
     """Return the name of a step at a time since the start, s."""
     return f"step at {time:.3f} s"
+
+
+def unit_parameters(units: BasisUnits) -> dict[str, float]:
+    """Return units as parameters by the keys of `UNIT_KEYS`."""
+    return dict(zip(UNIT_KEYS, (units.rate, units.acceleration, units.duration), strict=True))
 
 
 def is_of_time(name: str) -> bool:

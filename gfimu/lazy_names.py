@@ -1,4 +1,4 @@
-"""Names of a package that load on first use, so that its import waits for nothing heavy; former names of modules."""
+"""Names that load on first use, so that an import waits for nothing heavy; former names of modules."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 
 from gfimu.optional_packages import require
 
-__all__ = ["former_name", "names_on_first_use"]
+__all__ = ["command_above", "former_name", "names_on_first_use"]
 
 
 def names_on_first_use(
@@ -41,6 +41,20 @@ def names_on_first_use(
         return getattr(importlib.import_module(f"{package}.{homes[name]}"), name)
 
     return load
+
+
+def command_above(name: str) -> Callable[..., Any]:
+    """Return a command's function, a public name of gfimu, for the method of a result that hands itself to it.
+
+    The commands stand above all results, so that no result may import them: this is the one way up.
+
+    Parameters
+    ----------
+    name : str
+        Public name, such as ``view``.
+    """
+    function: Callable[..., Any] = getattr(importlib.import_module("gfimu"), name)
+    return function
 
 
 def former_name(module: str, new: str, *, removed: str) -> None:

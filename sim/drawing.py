@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from gfimu.geometry.array import AccelerometerArray
-from gfimu.geometry.turning_axis import TurningAxis
 from gfimu.visual.colours import chip_colour
 from gfimu.visual.rig import is_cube, stand_height
 from gfimu.visual.scene import Box, Cylinder, Mesh, Shape
@@ -22,7 +21,6 @@ __all__ = ["array_on_axis", "rig_drawing"]
 
 _FOOT = "adapter"
 _BOARD = 0.004  # half size, m: boards are larger, the packages on them smaller
-_LEANING = 0.2  # rad: an axis that leans less is that of a table
 _MOVING = ("cube", "table")  # a body belongs to the first of these among its ancestors, to the base otherwise
 
 
@@ -66,11 +64,9 @@ def array_on_axis(world: World) -> tuple[AccelerometerArray, NDArray[np.float64]
         The array with its turning axis in the body frame, and how far up the picture is moved, m, so that all of the
         body's circle is above the ground. None where the axis leans less than 0.2 rad: it is a table's.
     """
-    lean = float(np.linalg.norm(world.axis_rotvec))
-    if world.slide is not None or lean < _LEANING:
+    axis = world.leaning_axis()
+    if axis is None:
         return None
-    to_body = Rotation.from_rotvec(world.mount_rotvec).inv()
-    axis = TurningAxis(to_body.apply([0.0, 0.0, 1.0]), to_body.apply(-world.cube_offset), inclination=lean)
     arm = float(np.linalg.norm(world.cube_offset))
     return replace(world.array, turning_axis=axis), np.array([0.0, 0.0, arm + stand_height(world.array)])
 

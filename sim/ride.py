@@ -1,6 +1,6 @@
 """A board that rides a scenario: specific force, temperature and references at any time, chips at any output data rate.
 
-What `sim.scenarios.simulate` computes for a whole run at once, here for a board whose chips convert at instants of
+What `sim.simulation.simulate` computes for a whole run at once, here for a board whose chips convert at instants of
 their own. MuJoCo gives the specific force on a regular grid, in batches; splines carry it to the instants asked for.
 """
 
@@ -40,7 +40,7 @@ class Ride:
     scenario : Scenario, str or Path
         The scenario, or its name or file.
     seed : int
-        Seed of the chips' errors and of the noise; the chips are those of `sim.scenarios.simulate`.
+        Seed of the chips' errors and of the noise; the chips are those of `sim.simulation.simulate`.
 
     Raises
     ------

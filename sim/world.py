@@ -17,8 +17,10 @@ from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from gfimu.geometry.array import AccelerometerArray
+from gfimu.geometry.turning_axis import TurningAxis
 from gfimu.short_repr import short_repr
 from gfimu.units import STANDARD_GRAVITY
 from gfimu.world_model import SpinState
@@ -26,6 +28,7 @@ from sim.motions.motion import SpinMotion
 
 __all__ = ["DataStep", "Lean", "MotionStep", "Nod", "ReferenceStep", "SampleContext", "SensingStep", "Shake", "World"]
 
+_LEANING = 0.2  # rad: an axis that leans less is that of a table
 _ONE_LINE = 1e-9  # of the square of a nod: what rounding leaves of an area
 
 
@@ -254,6 +257,14 @@ class World:
         for step in self.sensing_steps:
             readings = step(readings, context)
         return readings
+
+    def leaning_axis(self) -> TurningAxis | None:
+        """Return the axis of a pendulum or a wheel in the body frame; None of a table, which hardly leans."""
+        lean = float(np.linalg.norm(self.axis_rotvec))
+        if self.slide is not None or lean < _LEANING:
+            return None
+        to_body = Rotation.from_rotvec(self.mount_rotvec).inv()
+        return TurningAxis(to_body.apply([0.0, 0.0, 1.0]), to_body.apply(-self.cube_offset), inclination=lean)
 
     def since_start(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the time since the recording began, s, shape (n,)."""

@@ -17,7 +17,7 @@ def page(project_root):
 
 def test_the_plans_of_the_page_are_plans(page, tmp_path):
     plans = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
-    assert len(plans) == 4
+    assert len(plans) == 5
     sizes = []
     for text in plans:
         (tmp_path / "plan.toml").write_text(text)
@@ -25,7 +25,7 @@ def test_the_plans_of_the_page_are_plans(page, tmp_path):
         design = Design(plan)
         check_factors(plan, design[0], "plan.toml")
         sizes.append(len(design))
-    assert sizes == [240, 128 * 6 * 16, 100_000, 64 * 2]
+    assert sizes == [120, 240, 128 * 6 * 16, 100_000, 64 * 2]
 
 
 def test_the_figure_of_the_page_is_there_and_small(page, project_root):

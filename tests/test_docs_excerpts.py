@@ -34,13 +34,17 @@ def test_commands_run_in_one_folder_from_top_to_bottom(tmp_path):
     page.write_text(
         "<!-- file: two.txt -->\n```\na\nb\n```\n\n```console\n$ cat two.txt | wc -l\n$ echo c >> two.txt\n```\n"
         "<!-- run: exit 3 -->\n```console\n$ tail -1 two.txt; exit 3\nold\n```\n"
-        "<!-- run: study -->\n```console\n$ false\nas it was\n```\n",
+        "<!-- run: study -->\n```console\n$ false\nas it was\n```\n"
+        "<!-- run: needs json -->\n```console\n$ echo present\n```\n"
+        "<!-- run: needs no_such_module -->\n```console\n$ echo absent\n```\n",
         encoding="utf-8",
     )
     made = excerpts.present(page)
     assert "wc -l\n2\n$ echo" in made
     assert "exit 3\nc\n```" in made
     assert "$ false\nas it was" in made
+    assert "$ echo present\npresent\n" in made
+    assert "$ echo absent\n```" in made
     with pytest.raises(RuntimeError, match="exit code 1 instead of 0"):
         excerpts.present(page, study=True)
 

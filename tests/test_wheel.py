@@ -66,7 +66,15 @@ def test_models_lie_inside_the_wheel(installed: Path) -> None:
     assert (installed / "sim" / "models" / "mjcf" / "turntable.xml").is_file()
     assert (installed / "gfimu" / "certification" / "certificate.schema.json").is_file()
     page = installed / "gfimu" / "visual" / "page"
-    for name in ("plots.js", "plots.css", "uplot/uPlot.iife.min.js", "uplot/uPlot.min.css", "uplot/LICENSE"):
+    for name in (
+        "plots.js",
+        "plots.css",
+        "basics.css",
+        "page.css",
+        "uplot/uPlot.iife.min.js",
+        "uplot/uPlot.min.css",
+        "uplot/LICENSE",
+    ):
         assert (page / name).is_file(), name
     assert (installed / "gfimu" / "diagnosis" / "report" / "templates" / "report.css").is_file()
     assert (installed / "sim" / "models" / "effects" / "catalogue.json").is_file()

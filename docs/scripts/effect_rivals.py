@@ -33,7 +33,8 @@ from gfimu.errors import InputError
 from sim.effects import make_effect
 from sim.motions.motion import SplineSpin
 from sim.motions.pose_sequence import PoseSequence
-from sim.scenarios import Scenario, simulate
+from sim.scenarios import Scenario
+from sim.simulation import simulate
 from sim.twin import Twin
 from sim.world import World
 

@@ -16,7 +16,8 @@ from effect_signatures import WARMING, WARMING_TIME, reference_run_of
 from gfimu.diagnosis.diagnose import diagnose
 from gfimu.errors import GfimuError
 from sim.effects.base import Effect
-from sim.scenarios import Scenario, simulate
+from sim.scenarios import Scenario
+from sim.simulation import simulate
 from sim.twin import Twin
 
 __all__ = ["changes_of", "run_of", "simulate_command", "trial", "twin_of"]

@@ -5,6 +5,7 @@ bottom in one folder that holds the files of docs/examples. A comment on the lin
 
     <!-- run: study -->           it takes long: left out unless asked for, in tests by -m study
     <!-- run: exit 2 -->          the command ends with this exit code instead of 0
+    <!-- run: needs unicorn -->   left out where this Python module is not installed
     <!-- file: my_array.toml -->  the block below is a file in that folder
     <!-- picture: array.png -->   the picture below is the file that a command has drawn there
 
@@ -15,6 +16,7 @@ Numbers agree if they differ by no more than one unit of the last digit that the
 from __future__ import annotations
 
 import argparse
+import importlib.util
 import os
 import re
 import shutil
@@ -70,7 +72,7 @@ def present(page: Path, *, study: bool = False, pictures: Path | None = None) ->
                 (folder / words).write_text(text, encoding="utf-8")
             elif part["mark"] == "picture" and (folder / words).is_file() and pictures is not None:
                 shutil.copyfile(folder / words, pictures / Path(part["link"]).name)
-            elif part["language"] == "console" and (study or "study" not in words):
+            elif part["language"] == "console" and (study or "study" not in words) and _installed(words):
                 code = re.search(r"exit (\d+)", words)
                 printed = "".join(
                     _output(line, int(code[1]) if code else 0, folder, environment)
@@ -90,6 +92,12 @@ def difference(stored: str, made: str) -> str:
         if not _same(old, new):
             return f"page: {old}\nnow:  {new}"
     return "" if len(before) == len(after) else f"page: {len(before)} lines\nnow:  {len(after)} lines"
+
+
+def _installed(words: str) -> bool:
+    """Whether the module is there that a block needs according to its mark."""
+    needed = re.search(r"needs (\w+)", words)
+    return needed is None or importlib.util.find_spec(needed[1]) is not None
 
 
 def _same(old: str, new: str) -> bool:

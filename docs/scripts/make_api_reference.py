@@ -37,7 +37,7 @@ OTHERS = {
         "Simulation",
         "Package `sim`. The parts that a program may build on: motions, sensors, effects and worlds.",
         {
-            "sim.scenarios": ("simulate",),
+            "sim.simulation": ("simulate",),
             "sim.world": ("World",),
             "sim.motions.motion": ("SpinMotion", "BodyMotion", "SpinState", "BodyState"),
             "sim.motions.profiles": ("spin_profile", "Hold", "Ramp", "Sine", "Chirp", "Tumble"),

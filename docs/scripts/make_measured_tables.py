@@ -23,7 +23,7 @@ import numpy as np
 
 import gfimu
 from sim.study.outcome_file import read_outcomes
-from sim.study.report import Tally, visible
+from sim.study.tally import Tally, visible
 
 FOLDER = Path(__file__).resolve().parents[1] / "accuracy"
 PAGE, SPEEDS, OUTCOMES = FOLDER / "measured.md", FOLDER / "speed.json", FOLDER / "diagnosis-study.jsonl.xz"

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from gfimu.bounds.sample import alpha_std, rate_bound_isotropic, steady_rate_bound
 from gfimu.geometry.array import AccelerometerArray
-from gfimu.motion.estimation import Estimate
+from gfimu.motion.estimate import Estimate
 from gfimu.motion.rest_bias import estimate_from_rest, rest_bias
 from gfimu.parts.part import white_noise_std
 from gfimu.position_drift import ErrorSources, drift_budget, equivalent_rate_drift
@@ -22,7 +22,8 @@ from gfimu.rate.kalman import FilterSettings
 from gfimu.rate.methods import RATE_METHODS, estimate_rate
 from gfimu.rate.sensing import SensorErrors
 from gfimu.recording import Recording
-from sim.scenarios import Scenario, simulate
+from sim.scenarios import Scenario
+from sim.simulation import simulate
 
 RATE = 100.0
 DRIFT_TIME = 30.0

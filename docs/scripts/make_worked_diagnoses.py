@@ -23,7 +23,8 @@ from gfimu.diagnosis.diagnose import diagnose
 from gfimu.diagnosis.verdict.verdict import Diagnosis
 from gfimu.recording.mimu4444 import read_mimu4444
 from gfimu.visual.colours import AFTER_ON_PAPER, BEFORE_ON_PAPER, NOISE_ON_PAPER, css
-from sim.scenarios import Scenario, simulate
+from sim.scenarios import Scenario
+from sim.simulation import simulate
 from sim.twin import Twin
 
 ROOT = Path(__file__).resolve().parents[2]

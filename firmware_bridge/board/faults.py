@@ -84,11 +84,6 @@ class BoardFault(GfimuError):  # noqa: N818 - "fault" is the processor's word fo
         detail = f"; {self.detail}" if self.detail else ""
         return f"firmware fault at {place}{within} after {self.time_s:.6f} s: {self.kind.value}{detail}"
 
-    def dump(self) -> str:
-        """All registers, four to a line."""
-        cells = [f"{name:>4} {value:08x}" for name, value in self.registers.items()]
-        return "\n".join("  ".join(cells[k : k + 4]) for k in range(0, len(cells), 4))
-
     def __reduce__(self) -> tuple[type[BoardFault], tuple[object, ...]]:
         return (
             BoardFault,

@@ -319,7 +319,7 @@ def _run(
     try:
         while has_to_agree and session.baud is None and time.monotonic() - began < _SILENCE_S and not stop():
             find_speed()
-        heard_at = began if session.baud is None else time.monotonic()
+        last_sample_at = began if session.baud is None else time.monotonic()
         session.expect_answers()
         for command in setup:
             link.write(command)
@@ -343,12 +343,12 @@ def _run(
                     for command in setup:
                         link.write(command)
                 if batch is not None:
-                    heard_at = now
+                    last_sample_at = now
                     if on_batch is not None:
                         on_batch(batch, session.decoder.counts)
-            if dialogue is not None and has_to_agree and session.first_s is not None and now - heard_at > _LOST_S:
+            if dialogue is not None and has_to_agree and session.first_s is not None and now - last_sample_at > _LOST_S:
                 find_speed()  # a board that started anew is back at its first speed
-                heard_at = time.monotonic()
+                last_sample_at = time.monotonic()
             if session.waiting_for_board and now >= session.give_up_s:
                 session.release()
             session.flush(now)
@@ -357,7 +357,7 @@ def _run(
             started = session.first_s is not None and duration_s is not None
             if started and session.last_s - session.first_s >= duration_s:  # type: ignore[operator]
                 return None
-            if session.first_s is None and now - heard_at > _SILENCE_S:
+            if session.first_s is None and now - last_sample_at > _SILENCE_S:
                 return None
     except GfimuError as error:
         return error

@@ -1,1 +1,5 @@
-"""Calibration: one error model, one result class, one method per file."""
+"""Calibration: one error model, one result class, one method per file.
+
+`methods` has one call for every name of `registry`. All return a `result.Calibration`, whose triads are those of
+`error_model`.
+"""

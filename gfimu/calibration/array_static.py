@@ -20,7 +20,8 @@ from gfimu.calibration.fit_quality import covariance_scale, odd_poses
 from gfimu.calibration.gauss_helmert import Condition, gauss_helmert
 from gfimu.calibration.nonlinearity import quadratic_statement, with_quadratic
 from gfimu.calibration.observations import Observations
-from gfimu.calibration.result import Calibration, parameter_names, quadratic_names
+from gfimu.calibration.parameter_names import parameter_names, quadratic_names
+from gfimu.calibration.result import Calibration
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
 

@@ -133,10 +133,10 @@ def _check(calibration: Calibration, observations: Observations, array: Accelero
 
 
 def _statement(observations: Observations, turn_on_std: float, walk: float) -> str:
-    wander = f" and follow a random walk of {walk:.3g} m/s²/√s" if walk else ""
+    drift = f" and follow a random walk of {walk:.3g} m/s²/√s" if walk else ""
     return (
         f"carried over from an earlier run and updated with {observations.n_poses} poses: biases taken to change by "
-        f"{turn_on_std:.3g} m/s² between the runs{wander}"
+        f"{turn_on_std:.3g} m/s² between the runs{drift}"
     )
 
 

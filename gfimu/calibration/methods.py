@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from gfimu.calibration.array_calibration import update_array_calibration
+from gfimu.calibration.combine import combine
 from gfimu.calibration.faults import (
     check_gravity,
     check_readings,
@@ -21,7 +22,7 @@ from gfimu.calibration.nonlinearity import quadratic_std
 from gfimu.calibration.observations import Observations, observations_from
 from gfimu.calibration.rate_table import body_axis, find_plateaus
 from gfimu.calibration.registry import METHODS, CalibrationMethod, calibration_method
-from gfimu.calibration.result import Calibration, combine
+from gfimu.calibration.result import Calibration
 from gfimu.calibration.spin.policy import SpinPolicy
 from gfimu.errors import InputError, naming
 from gfimu.geometry.array import AccelerometerArray

@@ -11,8 +11,8 @@ from scipy.signal import savgol_coeffs, savgol_filter
 from gfimu.errors import InputError
 from gfimu.importing.guessing.likely_reference import reference_remedy
 from gfimu.recording import Recording
-from gfimu.recording.reference_times import reference_on_rows
 from gfimu.recording.rest import detect_rest
+from gfimu.recording.timing.reference_times import reference_on_rows
 
 __all__ = ["MotionReference", "has_reference", "motion_reference"]
 

@@ -17,7 +17,8 @@ from gfimu.calibration.fit_quality import covariance_scale
 from gfimu.calibration.gauss_helmert import Adjustment, Condition, gauss_helmert
 from gfimu.calibration.nonlinearity import quadratic_statement, with_quadratic
 from gfimu.calibration.observations import Observations
-from gfimu.calibration.result import Calibration, parameter_names, quadratic_names
+from gfimu.calibration.parameter_names import parameter_names, quadratic_names
+from gfimu.calibration.result import Calibration
 from gfimu.errors import unknown_name
 from gfimu.geometry.gravity import EARTH_RATE
 

@@ -96,8 +96,9 @@ def quadratic_statement(observations: Observations) -> tuple[str, ...]:
     if not observations.bends:
         return ()
     at_1_g = float(observations.quadratic_prior.max() * np.ptp(observations.means, axis=0).max() ** 2 / 4.0)
+    unit = observations.unit.replace("m_s2", "m/s²").replace("lsb", "counts")
     text = (
-        f"non-linearity of the data sheet ({at_1_g:.2g} {observations.unit} at 1 g, standard deviation): quadratic "
+        f"non-linearity of the data sheet ({at_1_g:.2g} {unit} at 1 g, standard deviation): quadratic "
         "coefficients q are estimated with the other parameters and are in their standard deviations"
     )
     return (text,)

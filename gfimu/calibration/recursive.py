@@ -19,7 +19,8 @@ from gfimu.calibration.fit_quality import covariance_scale
 from gfimu.calibration.known_poses import face_poses
 from gfimu.calibration.nonlinearity import quadratic_statement
 from gfimu.calibration.observations import Observations
-from gfimu.calibration.result import Calibration, parameter_names, quadratic_names
+from gfimu.calibration.parameter_names import parameter_names, quadratic_names
+from gfimu.calibration.result import Calibration
 from gfimu.errors import InputError
 
 __all__ = ["RecursiveCalibrator", "recursive"]

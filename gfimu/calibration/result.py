@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -18,7 +18,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.calibration.error_model import GAUGES, ErrorModel, free_elements
+from gfimu.calibration.error_model import GAUGES, ErrorModel
+from gfimu.calibration.parameter_names import KINDS, cubic_names, parameter_names, quadratic_names
+from gfimu.calibration.valid_covariance import require_covariance, require_finite
 from gfimu.errors import InputError, UnitError
 from gfimu.files.atomic_file import write_text
 from gfimu.files.input_file import check_input
@@ -27,53 +29,14 @@ from gfimu.recording import Recording
 from gfimu.results import Panel, PlottedResult, Series
 from gfimu.short_repr import joined
 
-__all__ = [
-    "FORMAT_VERSION",
-    "Calibration",
-    "combine",
-    "cubic_names",
-    "load_calibration",
-    "parameter_names",
-    "quadratic_names",
-]
+__all__ = ["FORMAT_VERSION", "Calibration", "load_calibration"]
 
 FORMAT = "gfimu-calibration"
 FORMAT_VERSION = 1
 
-_ROUNDING = 1e-6
-"""Numerical tolerance of the covariance check, as a correlation: asymmetry, and how far below zero an eigenvalue is."""
-
 _AXES = "xyz"
 _READING_UNITS = {"lsb": ("lsb", "m_s2"), "m_s2": ("m_s2", "m_s2"), "rad_s": ("rad_s", "rad_s")}
 """Reading unit to (name of the reading unit, unit of the true input)."""
-
-
-_KINDS: Mapping[str, Callable[[list[str]], bool]] = {
-    "sensitivity": lambda parts: parts[1] == "M" and parts[2][0] == parts[2][1],
-    "cross-axis sensitivity": lambda parts: parts[1] == "M" and parts[2][0] != parts[2][1],
-    "bias": lambda parts: parts[1] == "b",
-    "position": lambda parts: parts[1] == "r",
-    "quadratic coefficient": lambda parts: parts[1] == "q",
-    "cubic coefficient": lambda parts: parts[1] == "c",
-    "delay": lambda parts: parts[1] == "d",
-}
-"""Kinds of parameters by the parts of their names, each a panel of the picture."""
-
-
-def parameter_names(chip: str, gauge: str) -> tuple[str, ...]:
-    """Names of a triad's parameters, in the order of `ErrorModel.parameters`: ``a1_M_xx`` … ``a1_b_z``."""
-    elements = [f"{chip}_M_{_AXES[i]}{_AXES[j]}" for i, j in free_elements(gauge)]
-    return (*elements, *(f"{chip}_b_{axis}" for axis in _AXES))
-
-
-def quadratic_names(chips: tuple[str, ...]) -> tuple[str, ...]:
-    """Names of the quadratic coefficients of chips: ``a1_q_x`` …, three per chip."""
-    return tuple(f"{chip}_q_{axis}" for chip in chips for axis in _AXES)
-
-
-def cubic_names(chips: tuple[str, ...]) -> tuple[str, ...]:
-    """Names of the cubic coefficients of chips: ``a1_c_x`` …, three per chip."""
-    return tuple(f"{chip}_c_{axis}" for chip in chips for axis in _AXES)
 
 
 @dataclass(frozen=True)
@@ -142,8 +105,8 @@ class Calibration(PlottedResult):
             raise InputError(f"a calibration of {count} parameters needs that many values and their covariance matrix")
         if len(self.channels) % 3 or not self.channels:
             raise InputError("a calibration needs three channels per chip")
-        _check_finite(self.names, self.values)
-        _check_covariance(self.names, self.covariance)
+        require_finite(self.names, self.values)
+        require_covariance(self.names, self.covariance)
         if self.null_space.size == 0:
             object.__setattr__(self, "null_space", np.empty((count, 0)))
 
@@ -185,7 +148,7 @@ class Calibration(PlottedResult):
     def _panels(self) -> list[Panel]:
         """One panel per kind of parameter, what it deviates from an ideal triad where that is 1 or 0."""
         panels = []
-        for title, belongs in _KINDS.items():
+        for title, belongs in KINDS.items():
             places = [place for place, name in enumerate(self.names) if belongs(name.split("_"))]
             if not places:
                 continue
@@ -416,38 +379,6 @@ class Calibration(PlottedResult):
         return calibration
 
 
-def _check_finite(names: tuple[str, ...], values: NDArray[np.float64]) -> None:
-    """Refuse values that hold NaN or infinity; the message names the first parameter."""
-    bad = np.flatnonzero(~np.isfinite(values))
-    if bad.size:
-        raise InputError(f"parameter {names[bad[0]]} is {values[bad[0]]}; calibrate again, with more poses")
-
-
-def _check_covariance(names: tuple[str, ...], covariance: NDArray[np.float64]) -> None:
-    """Refuse a matrix that is no covariance: not finite, not symmetric, or not positive semi-definite.
-
-    All three are judged on the correlations, because the parameters have different units and sizes.
-    """
-    remedy = "calibrate again, with more poses"
-    row, column = (int(place[0]) if len(place) else -1 for place in np.nonzero(~np.isfinite(covariance)))
-    if row >= 0:
-        raise InputError(f"the covariance of {names[row]} and {names[column]} is {covariance[row, column]}; {remedy}")
-    variance = np.diag(covariance)
-    if (variance < 0.0).any():
-        worst = int(np.argmin(variance))
-        raise InputError(f"the variance of {names[worst]} is negative ({variance[worst]:.3g}); {remedy}")
-    std = np.sqrt(variance)
-    unit = np.where(std > 0.0, std, 1.0)
-    correlation = covariance / np.outer(unit, unit)
-    apart = np.abs(correlation - correlation.T)
-    if apart.max(initial=0.0) > _ROUNDING:
-        row, column = divmod(int(np.argmax(apart)), len(names))
-        raise InputError(f"the covariance matrix is not symmetric at {names[row]} and {names[column]}; {remedy}")
-    least = float(np.linalg.eigvalsh(correlation).min(initial=0.0))
-    if least < -_ROUNDING * len(names):
-        raise InputError(f"the covariance matrix is not positive semi-definite (eigenvalue {least:.3g}); {remedy}")
-
-
 def load_calibration(path: str | Path) -> Calibration:
     """Read a calibration from its JSON file.
 
@@ -469,60 +400,3 @@ def load_calibration(path: str | Path) -> Calibration:
     except (ValueError, RecursionError):  # also of whole numbers with thousands of digits
         raise InputError(f"{file}: not a calibration file; make one with `gfimu calibrate`") from None
     return Calibration.from_dict(data, source=str(file))
-
-
-def combine(calibrations: Sequence[Calibration]) -> Calibration:
-    """Join independent calibrations of several chips into one; their covariance is block-diagonal.
-
-    Raises
-    ------
-    InputError
-        If they differ in method, unit, gauge or gravity.
-    """
-    first = calibrations[0]
-    if len(calibrations) == 1:
-        return first
-    for other in calibrations[1:]:
-        if (other.method, other.unit, other.gauge, other.gravity) != (
-            first.method,
-            first.unit,
-            first.gauge,
-            first.gravity,
-        ):
-            raise InputError("calibrations of different method, unit, gauge or gravity can't be joined")
-    sizes = [len(item.names) for item in calibrations]
-    ends = np.cumsum(sizes)
-    covariance = np.zeros((ends[-1], ends[-1]))
-    null_space = np.zeros((ends[-1], sum(item.null_space.shape[1] for item in calibrations)))
-    column = 0
-    for item, end, size in zip(calibrations, ends, sizes, strict=True):
-        block = slice(end - size, end)
-        covariance[block, block] = item.covariance
-        null_space[block, column : column + item.null_space.shape[1]] = item.null_space
-        column += item.null_space.shape[1]
-    statistics: dict[str, float | str] = {}
-    for item in calibrations:
-        statistics |= {f"{item.chips[0]}_{key}": value for key, value in item.statistics.items()}
-    return replace(
-        first,
-        channels=tuple(channel for item in calibrations for channel in item.channels),
-        names=tuple(name for item in calibrations for name in item.names),
-        values=np.concatenate([item.values for item in calibrations]),
-        covariance=covariance,
-        null_space=null_space,
-        statements=_merged({item.chips[0]: item.statements for item in calibrations}),
-        warnings=_merged({item.chips[0]: item.warnings for item in calibrations}),
-        statistics=statistics,
-    )
-
-
-def _merged(texts: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:
-    """Join the sentences of several chips: once where all say the same, else with the chip's name."""
-    groups = list(texts.values())
-    return tuple(
-        dict.fromkeys(
-            text if all(text in group for group in groups) else f"{chip}: {text}"
-            for chip, group in texts.items()
-            for text in group
-        )
-    )

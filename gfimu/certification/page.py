@@ -14,6 +14,7 @@ from markupsafe import Markup, escape
 from gfimu.certification.certificate import Certificate, ChipCertificate, Component, Term
 from gfimu.certification.numbers import plain_number, plus_minus
 from gfimu.files.atomic_file import atomic_folder
+from gfimu.visual.page import STILL_POLICY, page_basics
 
 __all__ = ["FILES", "certificate_html", "write_certificate"]
 
@@ -86,6 +87,8 @@ def _content(certificate: Certificate) -> Mapping[str, Any]:
     both = len(certificate.chips) == 1
     sheet, comparison = certificate.angular_sensor, certificate.comparison
     return {
+        "basics": page_basics(),
+        "policy": STILL_POLICY,
         "certificate": certificate,
         "unit": _UNITS[certificate.unit],
         "single": both,

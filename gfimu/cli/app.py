@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import importlib
 import json
 import os
 import sys
@@ -14,6 +13,7 @@ from dataclasses import dataclass
 import typer
 
 import gfimu
+from gfimu.cli import warning_lines
 from gfimu.cli.command import CONTEXT
 from gfimu.cli.command_group import JSON_ASKED, CommandGroup
 from gfimu.cli.output import print_json
@@ -53,7 +53,7 @@ def _options(
     """Collect the options of the program itself."""
     if json:
         raise InputError("--json stands after the command, or beside --version")
-    importlib.import_module("gfimu.cli.warning_lines").install()
+    warning_lines.install()
 
 
 def program() -> typer.Typer:

@@ -13,7 +13,7 @@ from gfimu.cli.output import print_json, print_paths, print_table, print_text, p
 from gfimu.cli.shared_options import JsonOption, shared
 
 if TYPE_CHECKING:
-    from gfimu.commands.benchmark import Judgement
+    from gfimu.commands.benchmark_results import Judgement
 
 __all__ = ["register"]
 

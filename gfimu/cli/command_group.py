@@ -7,14 +7,18 @@ from collections.abc import Iterator, MutableMapping
 from typing import Any
 
 import typer
+from typer.completion import install_callback, show_callback
 
 from gfimu.cli.command import CommandApp, GfimuGroup
 from gfimu.cli.command_list import COMMANDS, JOBS
 from gfimu.cli.completion import Offer
+from gfimu.errors import unknown_name
 
 __all__ = ["JSON_ASKED", "CommandGroup"]
 
 _HELP = "help"
+_COMPLETION = {"--install-completion": install_callback, "--show-completion": show_callback}
+_SHELLS = ("bash", "zsh", "fish", "powershell", "pwsh")
 
 JSON_ASKED = "gfimu.json"
 """Key of a context: whether the arguments hold --json."""
@@ -34,8 +38,12 @@ class CommandGroup(GfimuGroup):
         return [Offer(name, entry.help) for name, entry in COMMANDS.items() if name.startswith(incomplete)]
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Parse the arguments; ``help COMMAND`` is ``COMMAND --help``."""
+        """Parse the arguments; ``help COMMAND`` is ``COMMAND --help``, and a shell may be named for its completion."""
         ctx.meta[JSON_ASKED] = "--json" in args
+        if len(args) == 2 and args[0] in _COMPLETION:  # Typer would ignore the name and take the shell that it detects
+            if args[1] not in _SHELLS:
+                raise unknown_name("shell", args[1], _SHELLS)
+            _COMPLETION[args[0]](ctx, None, args[1])  # type: ignore[arg-type]
         if args and args[0] == _HELP:
             args = [*args[1:], "--help"]
         return super().parse_args(ctx, args)

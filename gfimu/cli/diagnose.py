@@ -169,6 +169,7 @@ def print_diagnosis(found: Diagnosis) -> None:
         percent,
         story,
         summary,
+        three_digits,
     )
 
     print_text(headline(found), style="bold")
@@ -189,12 +190,18 @@ def print_diagnosis(found: Diagnosis) -> None:
             left=2,
         )
     residual, gain = found.residual, found.gain
-    error = [("prediction error, rms", f"{residual.rms_before:.3g} m/s²", f"{residual.rms_after:.3g} m/s²")]
-    error += [(f"unseen data: {what}", before, after) for what, before, after in gain_rows(found)]
+    error = [
+        (
+            "prediction error, rms",
+            f"{three_digits(residual.rms_before)} m/s²",
+            f"{three_digits(residual.rms_after)} m/s²",
+        )
+    ]
+    error += [(f"validation data: {what}", before, after) for what, before, after in gain_rows(found)]
     share = percent(gain.share_of_excess_removed)
-    note = f"the sensors' own noise: {residual.noise_floor:.3g} m/s²"
+    note = f"the sensors' own noise: {three_digits(residual.noise_floor)} m/s²"
     if share != "–":
-        note += f"; on unseen data ({gain.held_out}) {share} of the error beyond noise is gone"
+        note += f"; on validation data ({gain.held_out}) {share} of the error beyond noise is gone"
     print_table("Error before and after", ("", "before", "after"), error, note=note)
     if found.rivals:
         rivals = [(" + ".join(one.effects) or "nothing", one.why, odds(one.log_odds)) for one in found.rivals[:5]]

@@ -14,7 +14,7 @@ from gfimu.cli.shared_options import ForceOption, JsonOption, MapOption, MapSetO
 from gfimu.errors import InputError
 
 if TYPE_CHECKING:
-    from gfimu.commands.drift import EquivalentErrors
+    from gfimu.commands.drift_from_position import EquivalentErrors
     from gfimu.known_axis.accuracy.drift import AxisDrift
     from gfimu.position_drift import DriftBudget
     from gfimu.position_drift.monte_carlo import DriftSample
@@ -96,7 +96,8 @@ def _drift(
     # One chip on a table
     gfimu drift --array one_chip --axis z --speed-rad-s 6 --duration 60 --bias-mg 5 --noise-ug 290
     """
-    from gfimu.commands.drift import axis_drift, drift, drift_from_position
+    from gfimu.commands.drift import axis_drift, drift
+    from gfimu.commands.drift_from_position import drift_from_position
     from gfimu.commands.drift_of_rest import drift_of_rest
     from gfimu.commands.known_axis import known_axis, turning_axis
     from gfimu.commands.opened import as_array

@@ -12,6 +12,7 @@ import os
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
 __all__ = ["console", "plain", "print_json", "print_paths", "print_table", "print_text", "progress"]
 
-_ENDLESS = 10_000  # numerical: columns, more than any table has
+_FRAME = 3  # characters that a column takes besides its cells (of the layout)
 
 
 def console(*, stderr: bool = False) -> Console:
@@ -66,22 +67,42 @@ def print_table(
 
     On a terminal too narrow for its words and numbers, each row is printed as a list of its cells.
     """
-    from rich.measure import Measurement
     from rich.table import Table
     from rich.text import Text
 
     screen, cells = console(), [[str(cell) for cell in row] for row in rows]
     table = Table(title=Text(title), title_justify="left", title_style="bold", caption=Text(note) if note else None)
     table.caption_justify = "left"
+    widths = _column_widths([header, *cells], screen.width)
+    if screen.is_terminal and widths is None:
+        _print_as_lists(title, header, cells, note)
+        return
     for place, name in enumerate(header):
-        table.add_column(Text(name), justify="left" if place < left else "right", overflow="fold")
+        width = None if widths is None else widths[place]
+        table.add_column(Text(name), justify="left" if place < left else "right", overflow="fold", width=width)
     for row in cells:
         table.add_row(*[Text(cell) for cell in row])
-    least = Measurement.get(screen, screen.options.update(max_width=_ENDLESS), table).minimum
-    if screen.is_terminal and least > screen.width:
-        _print_as_lists(title, header, cells, note)
-    else:
-        screen.print(table)
+    screen.print(table)
+
+
+def _column_widths(rows: Sequence[Sequence[str]], screen: int) -> list[int] | None:
+    """Return the widths of a table's columns, with no word broken; None where the screen is too narrow for that.
+
+    The widest columns are the first to wrap. Rich's own division breaks words of a column while others have room.
+    """
+    from rich.cells import cell_len
+
+    columns = list(zip_longest(*rows, fillvalue=""))
+    least = [max((cell_len(word) for cell in column for word in cell.split()), default=0) for column in columns]
+    most = [max((cell_len(line) for cell in column for line in cell.splitlines()), default=0) for column in columns]
+    room = screen - _FRAME * len(columns) - 1
+    if sum(least) > room:
+        return None
+    for widest in range(max(most), 0, -1):
+        widths = [max(low, min(high, widest)) for low, high in zip(least, most, strict=True)]
+        if sum(widths) <= room:
+            return widths
+    return least
 
 
 def _print_as_lists(title: str, header: Sequence[str], rows: Iterable[Sequence[str]], note: str) -> None:

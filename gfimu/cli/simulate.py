@@ -49,7 +49,8 @@ def _simulate(
     gfimu simulate tumble --out tumble.parquet --rrd tumble.rrd
     """
     from gfimu.commands.simulate import simulate
-    from sim.scenarios import Scenario, summarise
+    from sim.scenarios import Scenario
+    from sim.simulation import summarise
 
     with progress(f"simulating {scenario}", total=1.0) as done:
         recording = simulate(scenario, out=out, seed=seed, changes=changes or [], raw=raw, rrd=rrd, progress=done)

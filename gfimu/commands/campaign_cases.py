@@ -58,7 +58,7 @@ def estimate_case(case: Case) -> Mapping[str, float]:
         Root mean square errors of α, ω (norms) and p, that of ω at the end, and the error of the position at the end.
     """
     from gfimu.commands.estimate import estimate
-    from sim.scenarios import simulate
+    from sim.simulation import simulate
 
     scenario, method, calibration = _setting(case)
     recording = simulate(scenario, seed=case.seed)
@@ -94,7 +94,7 @@ def diagnose_case(case: Case) -> Mapping[str, Any]:
         of excess removed.
     """
     from sim.study.outcome import run_case
-    from sim.study.report import brief
+    from sim.study.tally import brief
 
     outcome = run_case(_study_case(case))
     return {**brief(outcome), "share_of_excess_removed": outcome["share_of_excess_removed"]}
@@ -221,7 +221,7 @@ def _calibrated(scenario: Scenario, seed: int) -> Calibration:
     """Calibrate the chips of a scenario from poses: the same seed draws the same chips."""
     from gfimu.calibration.array_calibration import calibrate_array
     from sim.motions.pose_sequence import PoseSequence
-    from sim.scenarios import simulate
+    from sim.simulation import simulate
 
     sequence = PoseSequence()
     poses = simulate(replace(scenario, motion=sequence, duration=sequence.duration), seed=seed)

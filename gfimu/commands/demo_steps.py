@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from gfimu.motion.estimation import Estimate
+    from gfimu.motion.estimate import Estimate
     from gfimu.motion.rest_bias import RestBias
     from gfimu.position_drift.monte_carlo import DriftSample
     from gfimu.recording import Recording
@@ -99,7 +99,8 @@ def score_geometry(demo: Demo) -> None:
 
 def simulate_run(demo: Demo) -> None:
     """Simulate the paper's run in MuJoCo."""
-    from sim.scenarios import Scenario, simulate
+    from sim.scenarios import Scenario
+    from sim.simulation import simulate
 
     path = demo.out / "run.parquet"
     demo.scenario = Scenario.load(_SCENARIO)
@@ -219,7 +220,7 @@ def calibrate_chips(demo: Demo) -> None:
     from gfimu.calibration.array_calibration import calibrate_array
     from gfimu.motion.estimation import estimate
     from sim.motions.pose_sequence import PoseSequence
-    from sim.scenarios import simulate
+    from sim.simulation import simulate
 
     array, gravity = demo.scenario.array, demo.scenario.gravity
     sequence = PoseSequence()
@@ -292,7 +293,8 @@ def diagnose_hidden(demo: Demo) -> None:
     from gfimu.commands.diagnose import write_report
     from gfimu.diagnosis.diagnose import diagnose
     from sim.effects import make_effect
-    from sim.scenarios import Scenario, simulate
+    from sim.scenarios import Scenario
+    from sim.simulation import simulate
     from sim.twin import Twin
 
     rng = np.random.default_rng([demo.seed, 5])

@@ -257,12 +257,14 @@ def drawn_rig(diagnosis: Diagnosis) -> DrawnRig | None:
     if not isinstance(twin, Twin):
         return None
     world = twin.world(mounting=np.array(diagnosis.mounting_rotvec_rad))
-    return DrawnRig(world.mount_rotvec, world.cube_offset, _shapes(twin, world), world.slide)
+    lean = None if world.leaning_axis() is None else world.axis_rotvec
+    return DrawnRig(world.mount_rotvec, world.cube_offset, _shapes(twin, world), world.slide, lean)
 
 
 def _shapes(twin: Twin, world: World) -> Mapping[str, Sequence[Shape]] | None:
     """Return the shapes of the rig; None where it has none of its own, or is not drawn here."""
-    if twin.drive_source == "gyro" or world.slide is not None or missing("mujoco", "rerun"):
+    on_table = world.slide is None and world.leaning_axis() is None
+    if twin.drive_source == "gyro" or not on_table or missing("mujoco", "rerun"):
         return None
     from sim.drawing import rig_drawing
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from gfimu.geometry.array import AccelerometerArray
     from gfimu.geometry.turning_axis import AxisUncertainty, TurningAxis
     from gfimu.importing import ColumnMap
-    from gfimu.motion.estimation import Estimate
+    from gfimu.motion.estimate import Estimate
     from gfimu.recording import Recording
     from gfimu.recording.mapped import RecordingLike
 
@@ -213,7 +213,7 @@ def estimate_run(
     from gfimu.motion.estimation import estimate as solve
     from gfimu.motion.rest_bias import estimate_from_rest
     from gfimu.recording.carried_array import warn_of_other_array
-    from gfimu.recording.reference_times import reference_on_rows
+    from gfimu.recording.timing.reference_times import reference_on_rows
 
     run, geometry = as_calibrated_run(as_source(recording, array, column_map, map_set), array, calibration)
     if array is not None and calibration is None:
@@ -285,7 +285,7 @@ def _require_all_motions(recording: Recording, array: AccelerometerArray) -> Non
     """Raise `GeometryError` for an array of low rank, with what it gives nevertheless."""
     from gfimu.errors import GeometryError
     from gfimu.geometry.observability import unseen_motions
-    from gfimu.motion.seen import few_motions_text
+    from gfimu.known_axis.few_motions import few_motions_text
 
     if unseen_motions(array):
         raise GeometryError(few_motions_text(array, recording.sample_rate))

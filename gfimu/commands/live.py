@@ -179,7 +179,7 @@ def _examine(lines: list[str], array: AccelerometerArray, rate: float, *, force:
 def _lines(source: str | Path, *, follow: bool) -> Iterator[str]:
     """Lines of the source as they arrive."""
     from gfimu.files.input_file import is_ordinary
-    from gfimu.rate.stream_source import recording_lines
+    from gfimu.recording.lines import recording_lines
 
     if source == "-":
         return iter(sys.stdin.readline, "")

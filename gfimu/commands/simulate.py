@@ -48,7 +48,7 @@ def simulate(
     Returns
     -------
     Recording
-        As `sim.scenarios.simulate`: readings, references and the truth.
+        As `sim.simulation.simulate`: readings, references and the truth.
 
     Raises
     ------
@@ -64,7 +64,7 @@ def simulate(
     """
     from gfimu.errors import InputError
     from sim.scenarios import Scenario
-    from sim.scenarios import simulate as run_scenario
+    from sim.simulation import simulate as run_scenario
 
     if seed < 0:
         raise InputError(f"seed {seed}: must be zero or positive")

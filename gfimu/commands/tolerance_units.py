@@ -16,7 +16,7 @@ from gfimu.tolerances.calibrated import uses_poses, uses_rest
 
 if TYPE_CHECKING:
     from gfimu.geometry.array import AccelerometerArray
-    from gfimu.motion.estimation import Estimate
+    from gfimu.motion.estimate import Estimate
     from gfimu.recording import Recording
     from gfimu.tolerances.known_motion import KnownMotion
     from gfimu.tolerances.tolerances import Tolerances

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from gfimu.geometry.array import AccelerometerArray
     from gfimu.geometry.turning_axis import TurningAxis
     from gfimu.importing import ColumnMap
-    from gfimu.motion.estimation import Estimate
+    from gfimu.motion.estimate import Estimate
     from gfimu.recording.mapped import RecordingLike
 
 __all__ = ["view"]
@@ -86,7 +86,7 @@ def view(
     from gfimu.commands.known_axis import turning_axis
     from gfimu.commands.opened import as_array, as_source
     from gfimu.diagnosis.verdict.verdict import Diagnosis
-    from gfimu.motion.estimation import Estimate
+    from gfimu.motion.estimate import Estimate
     from gfimu.visual.picture import picture_of, picture_path
     from gfimu.visual.viewer import open_viewer
 

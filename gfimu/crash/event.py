@@ -15,7 +15,7 @@ from gfimu.crash.polarity import DIRECTIONS, direction_remark, moved, sign_remar
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.geometry.kinematics import pseudo_inverse
-from gfimu.motion.estimation import Estimate
+from gfimu.motion.estimate import Estimate
 from gfimu.parts.limits import PartLimits
 from gfimu.recording import Recording
 from gfimu.results import Panel, PlottedResult

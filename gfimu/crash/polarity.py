@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.geometry.kinematics import specific_force
-from gfimu.motion.estimation import Estimate, estimate
+from gfimu.motion.estimate import Estimate
+from gfimu.motion.estimation import estimate
 from gfimu.recording import Recording
 
 __all__ = ["DIRECTIONS", "direction_remark", "moved", "sign_remark"]

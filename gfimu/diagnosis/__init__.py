@@ -1,4 +1,8 @@
-"""Diagnosis: what a simulation gets wrong against measured data, and why."""
+"""Diagnosis: what a simulation gets wrong against measured data, and why.
+
+Rooms, each of which imports itself and those before it: `data`, `terms`, `fit`, `search`, `criticism`, `verdict`,
+`report`, `design`. Above them stand `diagnose`, the verb, and `one_library`, its steps with one library of effects.
+"""
 
 from gfimu.diagnosis.diagnose import diagnose
 from gfimu.diagnosis.verdict.verdict import Diagnosis

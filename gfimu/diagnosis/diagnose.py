@@ -20,7 +20,7 @@ from gfimu.errors import InputError
 from gfimu.known_axis.axis_gyro import with_axis_gyro
 from gfimu.recording import Recording
 from gfimu.recording.carried_array import warn_of_other_array
-from gfimu.recording.reference_times import reference_on_rows
+from gfimu.recording.timing.reference_times import reference_on_rows
 from gfimu.world_model import WorldModel
 
 __all__ = ["diagnose", "prepare"]
@@ -67,7 +67,7 @@ def diagnose(
     """
     if not recordings:
         raise InputError("no recording to diagnose; give at least one")
-    tell = report or (lambda share, text: None)
+    progress = report or (lambda share, text: None)
     labels = list(names) if names is not None else [f"run {number + 1}" for number in range(len(recordings))]
     held_labels = [f"held-out run {number + 1}" for number in range(len(held_out))]
     for recording, label in zip((*recordings, *held_out), (*labels, *held_labels), strict=True):
@@ -76,11 +76,11 @@ def diagnose(
         settings = policy or Policy()
         if model.drive_source == "gyro":
             settings = settings.of_body()
-        tell(0.02, "read")
+        progress(0.02, "read")
         prepared = prepare(recordings, model, labels, settings, force=force)
         kept = prepare(held_out, model, held_labels, settings, force=force) if held_out else None
         try:
-            found = _by_stages(prepared, kept, model, settings, tell)
+            found = _by_stages(prepared, kept, model, settings, progress)
         except np.linalg.LinAlgError as error:
             runs = ", ".join(labels)
             raise InputError(
@@ -136,7 +136,7 @@ def _by_stages(
 def _worth(found: Diagnosis) -> float:
     """Return how far a verdict answers: the probability that the library holds the truth, less where it is unknown.
 
-    Of two descriptions of what is unknown that counts which removes more of the error that its fit never saw.
+    Of two descriptions of what is unknown that counts which removes more of the error on validation data.
     """
     if found.verdict == "unknown":
         return min(float(np.nan_to_num(found.gain.share_of_excess_removed)), 1.0) - 2.0

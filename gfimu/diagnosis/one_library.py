@@ -25,7 +25,8 @@ from gfimu.diagnosis.verdict.conclude import Described, conclude, is_dominant, i
 from gfimu.diagnosis.verdict.gate import impossible_sizes, judge, measurable
 from gfimu.diagnosis.verdict.library import LibraryEvidence, with_library
 from gfimu.diagnosis.verdict.naming import conflicting
-from gfimu.diagnosis.verdict.verdict import Diagnosis, NamedCause
+from gfimu.diagnosis.verdict.parts import NamedCause
+from gfimu.diagnosis.verdict.verdict import Diagnosis
 from gfimu.world_model import WorldModel, is_of_one_recording
 
 __all__ = ["LibraryDiagnosis", "Report", "stretches_of"]
@@ -63,15 +64,15 @@ class LibraryDiagnosis:
 
     def understood(self, models: Collection[str] | None = None) -> Understanding:
         """Return what a search finds, under some models of the nuisance parameters only or under all."""
-        stretches, tell = stretches_of(self._model, self._prepared), self._report
+        stretches, progress = stretches_of(self._model, self._prepared), self._report
         return understand_any_length(
-            stretches, self._policy, lambda share, text: tell(0.05 + 0.8 * share, text), models=models
+            stretches, self._policy, lambda share, text: progress(0.05 + 0.8 * share, text), models=models
         )
 
     def verdict(self, understanding: Understanding) -> Diagnosis:
         """Return the verdict on what a search found."""
-        policy, tell = self._policy, self._report
-        tell(0.88, "lack of fit")
+        policy, progress = self._policy, self._report
+        progress(0.88, "lack of fit")
         understanding, left = self._apart_from_the_rest(understanding)
         withdrawn: list[str] = []
         bound = self._coincidence(understanding.explanation)
@@ -79,11 +80,11 @@ class LibraryDiagnosis:
             return self._described(understanding, left, withdrawn, bound.sentence)
         gain = Gain()
         if not is_dominant(understanding.explanation, left, policy):
-            tell(0.92, "hold out")
+            progress(0.92, "hold out")
             try:
                 understanding, withdrawn = self._gated(understanding)
                 left = self._left(understanding.explanation) if withdrawn else left
-                tell(0.97, "measure the gain")
+                progress(0.97, "measure the gain")
                 gain = self._gain(understanding.explanation, understanding.explanation.best)
             except np.linalg.LinAlgError:
                 return self._described(understanding, left, withdrawn, "the causes found can't be fitted to part of it")
@@ -179,7 +180,7 @@ class LibraryDiagnosis:
         return replace(understanding, explanation=explanation), withdrawn
 
     def _gain(self, explanation: Explanation, fit: Fit) -> Gain:
-        """Measure what all that was found is worth on data the fit never saw."""
+        """Measure what all that was found is worth on validation data."""
         found = fit.causes or fit.point.residue or any(stretch.known for stretch in explanation.stretches)
         if not found:
             return Gain()
@@ -234,7 +235,7 @@ class LibraryDiagnosis:
     def _described(
         self, understanding: Understanding, left: LackOfFit, withdrawn: Sequence[str], refuted: str
     ) -> Diagnosis:
-        """Return the verdict unknown, with the description that predicts best what its fit never saw, if one does."""
+        """Return the verdict unknown, with the description that predicts the validation data best, if one does."""
         explanation, described, gain = understanding.explanation, None, Gain()
         body = isinstance(explanation.stretches[0], BodyStretch)  # its motion has no functions to describe it by
         found = [] if body else surrogates(explanation.stretches, explanation.nothing, self._policy, left.hints)

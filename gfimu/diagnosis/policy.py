@@ -102,7 +102,7 @@ class Policy:
         is missed than explained, or the prior says more than the data.
     sizeable : float
         Share that is worth a sentence, or a change of the noise [1]: of the range of the noise power over six parts of
-        the samples, of a residual that follows a quantity, of the gain that unseen data lack. Set beyond what the
+        the samples, of a residual that follows a quantity, of the gain that validation data lack. Set beyond what the
         noise of a part changes by.
     small : float
         Share that is a small one [1]: of the log odds of a round's best term, of the excess of causes that explain it

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.calibration.error_model import free_elements
-from gfimu.calibration.result import Calibration, parameter_names
+from gfimu.calibration.parameter_names import parameter_names
+from gfimu.calibration.result import Calibration
 from gfimu.errors import InputError, unknown_name
 from gfimu.geometry.array import AccelerometerArray, Chip
 from gfimu.parts.part import Part

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray, Chip
 from gfimu.recording import Recording
-from gfimu.recording.reference_times import reference_on_rows
+from gfimu.recording.timing.reference_times import reference_on_rows
 from gfimu.units import GYRO_COLUMNS
 
 __all__ = ["ChipStream", "chips_of", "stamps_ns"]

@@ -1,1 +1,1 @@
-"""Geometry of an accelerometer array: its file, kinematics, solutions, figures of merit, search; local gravity."""
+"""Geometry of an accelerometer array: its file, kinematics, solutions, figures of merit; gravity, smooth ramps."""

@@ -17,7 +17,7 @@ from gfimu.known_axis.fit import fit_axis
 from gfimu.known_axis.problem import AxisProblem
 from gfimu.known_axis.recursion import smooth_axis
 from gfimu.motion.attitude import from_rotation
-from gfimu.motion.estimation import FORMAT_VERSION, Estimate
+from gfimu.motion.estimate import FORMAT_VERSION, Estimate
 from gfimu.parts.part import white_noise_std
 from gfimu.recording import Recording
 from gfimu.recording.carried_array import array_metadata

@@ -10,12 +10,10 @@ from numpy.typing import NDArray
 
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.integrity.fault import ChannelFault, ChannelHealth, HealthCode
-from gfimu.rate.sensing import SensorErrors
+from gfimu.rate.sensing import SensorErrors, step_of_readings
 from gfimu.short_repr import short_repr
 
-__all__ = ["UsedReadings", "step_of_readings", "stuck_readings", "watched_readings"]
-
-_FOR_STEP = 20_000  # numerical: samples in which the step of the readings is looked for
+__all__ = ["UsedReadings", "stuck_readings", "watched_readings"]
 
 
 @dataclass(frozen=True)
@@ -142,16 +140,6 @@ def stuck_readings(readings: NDArray[np.float64], after: int) -> NDArray[np.bool
     new[1:] = readings[1:] != readings[:-1]  # NaN differs from all
     first = np.maximum.accumulate(np.where(new, rows, 0), axis=0)  # (n, c), row of the first equal reading
     return np.asarray(rows - first + 1 >= after)
-
-
-def step_of_readings(readings: NDArray[np.float64]) -> float:
-    """Return the step of the readings (n, c), m/s²: the least difference of two values, the median of the channels."""
-    steps = []
-    for column in readings[:_FOR_STEP].T:
-        values = np.unique(column[np.isfinite(column)])
-        if len(values) > 1:
-            steps.append(float(np.diff(values).min()))
-    return float(np.median(steps)) if steps else 0.0
 
 
 def _stuck_fault(name: str, onset: float, found: float, end: float) -> ChannelFault:

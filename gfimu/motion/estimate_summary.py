@@ -16,7 +16,7 @@ from gfimu.geometry.kinematics import null_space, omega_products
 from gfimu.geometry.observability import unseen_motions
 from gfimu.motion.earth import EarthRotation
 from gfimu.motion.equivalent_errors import equivalent_p_bias, equivalent_rate_drift
-from gfimu.motion.estimation import Estimate
+from gfimu.motion.estimate import Estimate
 from gfimu.motion.rest_bias import ForceAtRest, force_at_rest
 from gfimu.recording import Recording
 from gfimu.short_repr import short_repr

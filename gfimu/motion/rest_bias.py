@@ -20,7 +20,8 @@ from scipy.spatial.transform import Rotation
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.geometry.kinematics import specific_force
-from gfimu.motion.estimation import Estimate, estimate
+from gfimu.motion.estimate import Estimate
+from gfimu.motion.estimation import estimate
 from gfimu.parts.limits import PartLimits
 from gfimu.rate.registry import rate_method
 from gfimu.recording import Recording

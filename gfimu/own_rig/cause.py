@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.errors import InputError
-from gfimu.generic_basis import OF_READING, Motion, basis_function, is_of_time
+from gfimu.generic_basis import OF_READING, UNIT_KEYS, Motion, basis_function, is_of_time, unit_parameters
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.own_rig.places import Pattern, Size, channel_patterns
 from gfimu.units import NAME, RATIO, STANDARD_GRAVITY
@@ -26,7 +26,6 @@ _BIAS_LEFT = 0.3e-3 * STANDARD_GRAVITY  # m/s²: what a good calibration leaves
 _GAIN, _GAIN_LEFT = 0.02, 5e-4
 _LARGEST_GAIN = 0.3  # more is another unit
 _UNNAMED = 0.1  # m/s²
-_UNITS = ("rate_unit_rad_s", "acceleration_unit_rad_s2", "duration_s")
 
 
 @dataclass(frozen=True)
@@ -244,14 +243,13 @@ class UnnamedCause:
 
     def __call__(self, parameters: Mapping[str, Any]) -> Presence:
         """Return the term with its coefficients, which name their function in reports and files."""
-        units = dict(zip(_UNITS, (self.units.rate, self.units.acceleration, self.units.duration), strict=True))
-        return Presence(self, {"dependence": self.dependence, **units, **parameters})
+        return Presence(self, {"dependence": self.dependence, **unit_parameters(self.units), **parameters})
 
     @classmethod
     def of_file(cls, parameters: Mapping[str, Any]) -> Presence:
         """Return a term from the parameters that a twin file holds; raises `InputError` for those of no term."""
         try:
-            units = BasisUnits(*(float(parameters[key]) for key in _UNITS))
+            units = BasisUnits(*(float(parameters[key]) for key in UNIT_KEYS))
             dependence = str(parameters["dependence"])
         except (KeyError, TypeError, ValueError) as error:
             raise InputError(
@@ -267,8 +265,7 @@ class UnnamedCause:
 
     def parameter_units(self, array: AccelerometerArray) -> Mapping[str, str]:
         """Return the unit of each parameter."""
-        units = dict(zip(_UNITS, ("rad/s", "rad/s²", "s"), strict=True))
-        return {"dependence": NAME} | units | {one.key: one.unit for one in self.sizes(array)}
+        return {"dependence": NAME} | UNIT_KEYS | {one.key: one.unit for one in self.sizes(array)}
 
     def patterns(self, array: AccelerometerArray) -> tuple[Pattern, ...]:
         """Return one place: every coefficient free."""

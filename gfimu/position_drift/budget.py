@@ -295,8 +295,8 @@ def drift_budget(
         ("bias of alpha", "g b t⁴/24", bias * sd_alpha, "rad/s²", bias**2 * constant(alpha_only)),
         ("noise of p", "√(S t³/3)", density * sd_p, "m/s²/√Hz", density**2 * white(p_only)),
         ("noise of alpha", "g √(S t⁷/252)", density * sd_alpha, "rad/s²/√Hz", density**2 * white(alpha_only)),
-        ("walk of the bias of p", "K √(t⁵/20)", walk * sd_p, "m/s²/√s", walk**2 * walking(p_only)),
-        ("walk of the bias of alpha", "g K √(t⁹/5184)", walk * sd_alpha, "rad/s²/√s", walk**2 * walking(alpha_only)),
+        ("bias random walk of p", "K √(t⁵/20)", walk * sd_p, "m/s²/√s", walk**2 * walking(p_only)),
+        ("bias random walk of alpha", "g K √(t⁹/5184)", walk * sd_alpha, "rad/s²/√s", walk**2 * walking(alpha_only)),
         ("gravity lost by tilt", "∬ g ψ²/2", float(growth.tilt[-1]), "rad", of_fall),
     ]
     # The whole covariance, not the sum of its parts: in a skew geometry the errors of alpha and p are correlated.

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from gfimu.errors import GeometryError, InputError
 from gfimu.geometry.array import AccelerometerArray
@@ -16,7 +16,7 @@ from gfimu.rate.refinement import refined
 from gfimu.rate.result import RateEstimate
 from gfimu.rate.sensing import SensorErrors
 
-__all__ = ["filter_rate", "require_finite", "run_filter"]
+__all__ = ["filter_rate", "increasing_times", "require_finite", "run_filter"]
 
 
 def filter_rate(
@@ -70,6 +70,22 @@ def filter_rate(
     return refined(array, times, rows, errors, chosen, run, causal=True)
 
 
+def increasing_times(t: ArrayLike, needed_by: str) -> tuple[NDArray[np.float64], float]:
+    """Return sample times, shape (n,), s, and their median step, s.
+
+    Raises
+    ------
+    InputError
+        If there are fewer than two, or they do not increase.
+    """
+    times = np.asarray(t, dtype=float)
+    if times.ndim != 1 or len(times) < 2:
+        raise InputError(f"{needed_by} needs at least two samples; record longer")
+    if not np.isfinite(times).all() or np.any(np.diff(times) <= 0):
+        raise InputError("sample times must be finite and increase; drop repeated or reordered samples")
+    return times, float(np.median(np.diff(times)))
+
+
 def require_finite(array: AccelerometerArray, result: RateEstimate) -> None:
     """Refuse an estimate that ran away.
 
@@ -97,12 +113,7 @@ def run_filter(
     progress: Callable[[float], object] | None = None,
 ) -> tuple[RateEstimate, LiveRateFilter]:
     """Like `filter_rate`; also returns the filter as it is at the end."""
-    times = np.asarray(t, dtype=float)
-    if times.ndim != 1 or len(times) < 2:
-        raise InputError("the filter needs at least two samples; record longer")
-    if not np.isfinite(times).all() or np.any(np.diff(times) <= 0):
-        raise InputError("sample times must be finite and increase; drop repeated or reordered samples")
-    period = float(np.median(np.diff(times)))
+    times, period = increasing_times(t, "the filter")
     live = LiveRateFilter(array, errors, period, settings, gyro=gyro is not None, progress=progress)
     pushed, _ = live.push_raw(times, readings, gyro)
     if not live.hypotheses:  # never clear of the biases

@@ -27,12 +27,13 @@ from gfimu.parts.part import white_noise_std
 from gfimu.parts.part_file import PartFile
 from gfimu.short_repr import short_repr
 
-__all__ = ["ChannelTables", "SensorErrors"]
+__all__ = ["ChannelTables", "SensorErrors", "step_of_readings"]
 
 _RANK_TOLERANCE = 1e-9
 _LARGEST = 1e6  # numerical: m/s², far beyond any part
 _WEAK = 0.1  # products seen more weakly than this share of the best are not used to clean α
 _LEAST_NOISE_LSB = 0.3  # LSB: below that equal readings prove nothing
+_FOR_STEP = 20_000  # numerical: samples in which the step of the readings is looked for
 _EQUAL_READINGS = 1e-7  # probability per sample at which equal readings count as a stuck channel
 
 
@@ -281,3 +282,13 @@ def _clean(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
     """Set rounding errors to zero, so that what cancels exactly is an exact zero."""
     largest = np.abs(matrix).max(initial=0.0)
     return np.where(np.abs(matrix) > _RANK_TOLERANCE * max(1.0, largest), matrix, 0.0)
+
+
+def step_of_readings(readings: NDArray[np.float64]) -> float:
+    """Return the step of the readings (n, c), m/s²: the least difference of two values, the median of the channels."""
+    steps = []
+    for column in readings[:_FOR_STEP].T:
+        values = np.unique(column[np.isfinite(column)])
+        if len(values) > 1:
+            steps.append(float(np.diff(values).min()))
+    return float(np.median(steps)) if steps else 0.0

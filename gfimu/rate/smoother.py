@@ -15,9 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
-from gfimu.rate.filter import require_finite, run_filter
+from gfimu.rate.filter import increasing_times, require_finite, run_filter
 from gfimu.rate.kalman import FilterSettings, KalmanRateFilter, spread_rest
 from gfimu.rate.refinement import refined
 from gfimu.rate.result import RateEstimate, SignDecision
@@ -65,12 +64,7 @@ def smooth_rate(
     InputError
         If the shapes don't fit, time does not increase or there are fewer than two samples.
     """
-    times = np.asarray(t, dtype=float)
-    if times.ndim != 1 or len(times) < 2:
-        raise InputError("the smoother needs at least two samples; record longer")
-    if not np.isfinite(times).all() or np.any(np.diff(times) <= 0):
-        raise InputError("sample times must be finite and increase; drop repeated or reordered samples")
-    period = float(np.median(np.diff(times)))
+    times, period = increasing_times(t, "the smoother")
     rows = np.asarray(readings, dtype=float)
     turning = None if gyro is None else np.asarray(gyro, dtype=float)
 

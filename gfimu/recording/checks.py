@@ -23,8 +23,10 @@ from gfimu.geometry.observability import unseen_motions
 from gfimu.parts.limits import PartLimits
 from gfimu.recording.carried_array import warn_of_other_array
 from gfimu.recording.evidence.explanation import explanations
+from gfimu.recording.evidence.gathering import gather
 from gfimu.recording.evidence.gravity import gravity_text
-from gfimu.recording.evidence.rigid import Evidence, Otherwise, gather
+from gfimu.recording.evidence.reference_rate import odd_rates
+from gfimu.recording.evidence.rigid import Evidence, Otherwise
 from gfimu.recording.evidence.ways import TIME_UNITS, time_text
 from gfimu.recording.recording import Recording
 
@@ -43,6 +45,7 @@ _LEAST_NOISE = 0.3  # of the data sheet's: from that on a channel surely has noi
 _ALIKE = 1.5  # ratio of the costs of two ways that can't be separated
 _AS_GOOD = 0.05  # of the contradiction is left: as good as nothing, whatever another way leaves
 _RATE_RATIO = 1.5  # between the rate by the times and the metadata's, for a refusal
+_FOLLOWS = 0.5  # correlation of the turning with the tachometer, by which the sign of the turning is sure; by choice
 _SLOWEST = 2.0  # Hz, a rate that is plausible for a moving body
 
 
@@ -53,8 +56,8 @@ class Finding:
     Parameters
     ----------
     kind : str
-        ``time``, ``unit``, ``chip_unit``, ``sign``, ``exchange``, ``duplicate``, ``array``, ``rest_bias``, ``dead``
-        or ``clipped``.
+        ``time``, ``unit``, ``chip_unit``, ``sign``, ``exchange``, ``duplicate``, ``array``, ``reference``,
+        ``rest_bias``, ``dead`` or ``clipped``.
     text : str
         Cause and remedy, one line.
     refused : bool
@@ -230,6 +233,8 @@ def check_recording(recording: Recording, array: AccelerometerArray) -> tuple[Fi
     if not found and unseen_motions(array):  # too few channels to contradict one another
         text, refused = gravity_text(recording, array, limits)
         found += [Finding("unit", text, refused)] if text else []
+    if not found:
+        found += [Finding("reference", one.text, one.certain) for one in odd_rates(recording, array, limits, alive)]
     return (*sorted(found, key=lambda one: not one.refused), *dead)
 
 
@@ -324,6 +329,11 @@ def _decide(evidence: Evidence) -> list[Finding]:
     if not found:
         return []
     best = found[0]
+    # A mirrored way fits as well where two chips are each other's mirror image; the sign of the tachometer tells.
+    turned = {id(one): evidence.follows_tacho(one.way) for one in found if one.left < max(_AS_GOOD, _ALIKE * best.left)}
+    if max(turned.values()) > _FOLLOWS:
+        found = [one for one in found if turned.get(id(one), -1.0) > -_FOLLOWS]
+        best = found[0]
     # A whole chip is in another unit more often than one of its axes; one axis alone shows in the noise of the others.
     wider = [one for one in found if one.way.kind == best.way.kind and one.left < max(_AS_GOOD, _ALIKE * best.left)]
     best = max(wider, key=lambda one: len(one.way.channels))
@@ -333,7 +343,7 @@ def _decide(evidence: Evidence) -> list[Finding]:
 
 def _finding(way: Otherwise, alike: Sequence[Otherwise], *, refused: bool) -> Finding:
     text = way.text if refused else f"{way.text} (likely, not certain)"
-    others = [one for one in alike if one.kind == way.kind and one.channels != way.channels][:3]
+    others = [one for one in alike if one.kind == way.kind and one.about != way.about][:3]
     if others and way.channels:
-        text += "; as likely: " + ", or ".join(" and ".join(one.channels) for one in others)
+        text += "; as likely: " + ", or ".join(one.about for one in others)
     return Finding(way.kind, text, refused, way.channels)

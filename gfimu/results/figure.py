@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,7 +30,7 @@ def drawn(panels: Sequence[Panel], figure: Figure | SubFigure | None = None) -> 
     drawing = _new_figure(across, down) if figure is None else figure
     grid = drawing.subplots(down, across, squeeze=False)
     for axes, panel in zip(grid.flat, panels, strict=False):
-        _draw(axes, panel)
+        _draw(axes, _as_written(panel))
     for axes in grid.flat[len(panels) :]:
         axes.remove()
     return drawing
@@ -53,13 +54,30 @@ def drawn_chips(
         axes.scatter(*place, s=36, color=colour)
         for direction in directions:
             axes.quiver(*place, *(0.35 * reach * direction), color=colour, linewidth=1.4, arrow_length_ratio=0.25)
-        axes.text(*(place + 0.08 * reach), name, fontsize=9)
-    axes.set_title(f"{title}, body frame", fontsize=10)
+        axes.text(*(place + 0.08 * reach), _literal(name), fontsize=9)
+    axes.set_title(f"{_literal(title)}, body frame", fontsize=10)
     for axis in "xyz":
         getattr(axes, f"set_{axis}lim")(-1.4 * reach, 1.4 * reach)
         getattr(axes, f"set_{axis}label")(f"{axis}, mm")
     axes.set_box_aspect((1.0, 1.0, 1.0))
     return drawing
+
+
+def _as_written(panel: Panel) -> Panel:
+    """Return the panel with texts that matplotlib shows as they are: names come from files of others."""
+    return replace(
+        panel,
+        title=_literal(panel.title),
+        y_label=_literal(panel.y_label),
+        x_label=_literal(panel.x_label),
+        series=tuple(replace(one, name=_literal(one.name)) for one in panel.series),
+        x=tuple(map(_literal, panel.x)) if isinstance(panel.x, tuple) else panel.x,
+    )
+
+
+def _literal(text: str) -> str:
+    """Return a text without mathematics in it: two dollar signs would enclose a formula."""
+    return text.replace("$", r"\$")
 
 
 def _new_figure(across: int, down: int) -> Figure:
@@ -117,14 +135,21 @@ def _draw_names(axes: Any, panel: Panel) -> None:
             color=_colour(series, number), label=_label(series) or "_",
         )  # fmt: skip
     turned = len(names) > _MANY_NAMES or max(map(len, names), default=0) > 14
-    axes.set_xticks(places, names, rotation=60 if turned else 0, ha="right" if turned else "center", fontsize=8)
+    axes.set_xticks(
+        places,
+        list(names),
+        rotation=60 if turned else 0,
+        ha="right" if turned else "center",
+        fontsize=8,
+    )
     axes.set_xlim(-0.6, len(names) - 0.4)
     if panel.x_label and panel.x_label != OF_TIME:
         axes.set_xlabel(panel.x_label)
 
 
 def _label(series: Series) -> str:
-    return f"{series.name} ± 2σ" if series.name and series.std is not None else series.name
+    name = series.name
+    return f"{name} ± 2σ" if name and series.std is not None else name
 
 
 def _colour(series: Series, place: int) -> str:

@@ -6,10 +6,11 @@ import json
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar, cast, overload
+from typing import TYPE_CHECKING, Any, TypeVar, overload
 
 from numpy.typing import NDArray
 
+from gfimu.lazy_names import command_above
 from gfimu.optional_packages import require
 from gfimu.results.html import result_html
 from gfimu.results.panels import Panel
@@ -192,6 +193,4 @@ class RunResult(PlottedResult):
         InputError
             If the name does not end in ``.rrd``, its folder can't be written to, or the array is not known.
         """
-        import gfimu  # the command stands above what it shows
-
-        return gfimu.view(cast("Any", self), out=path)
+        return Path(command_above("view")(self, out=path))

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from gfimu.errors import InputError, unknown_name
 from gfimu.recording import Recording
-from gfimu.recording.reference_times import reference_series
 from gfimu.recording.rest import detect_rest
+from gfimu.recording.timing.reference_times import reference_series
 from gfimu.results import Panel, PlottedResult, Series, text_column
 from gfimu.sensor_noise.identification import TERMS, NoiseModel, identify_noise
 from gfimu.short_repr import short_repr

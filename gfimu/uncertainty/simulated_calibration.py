@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.calibration.combine import combine
 from gfimu.calibration.coverage import FACES
 from gfimu.calibration.observations import Observations
+from gfimu.calibration.parameter_names import quadratic_names
 from gfimu.calibration.registry import METHODS, CalibrationMethod
-from gfimu.calibration.result import Calibration, combine, quadratic_names
+from gfimu.calibration.result import Calibration
 from gfimu.uncertainty.stage_errors import StageErrors, specific_force
 
 __all__ = ["SimulatedCalibration", "calibrate_under", "chip_statistic", "poses_of", "simulated_method"]

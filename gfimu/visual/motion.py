@@ -29,7 +29,7 @@ __all__ = [
 
 
 class MotionEstimate(Protocol):
-    """What the picture needs of an estimate (`gfimu.motion.estimation.Estimate` has it); body axes throughout."""
+    """What the picture needs of an estimate (`gfimu.motion.estimate.Estimate` has it); body axes throughout."""
 
     @property
     def t_s(self) -> NDArray[np.float64]:

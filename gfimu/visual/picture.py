@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +13,8 @@ from gfimu.files.table import ArrowStream
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.geometry.turning_axis import TurningAxis
 from gfimu.known_axis.estimation import estimate_about_axis
-from gfimu.motion.estimation import Estimate, estimate
+from gfimu.motion.estimate import Estimate
+from gfimu.motion.estimation import estimate
 from gfimu.motion.rest_bias import estimate_from_rest, rest_bias
 from gfimu.recording import Recording
 from gfimu.recording.carried_array import carried_array, warn_of_other_array
@@ -55,7 +57,8 @@ def picture_of(
     array : AccelerometerArray, optional
         The array; the recording's own otherwise.
     axis : TurningAxis, optional
-        The axis about which alone it turns; the array's own otherwise, where it can't see all six motions.
+        The axis about which alone it turns; by default that of the recording's rig (a pendulum), or the array's own
+        where it can't see all six motions.
     force : bool
         Go on, with a warning, where the checks of the recording would refuse it.
 
@@ -74,6 +77,9 @@ def picture_of(
         return
     run, geometry = _with_array(recording, array)
     examine(run, geometry, source=name.name, force=force)
+    carried = run.metadata.get("rig_axis")
+    if axis is None and geometry.turning_axis is None and isinstance(carried, Mapping):
+        axis = TurningAxis.from_dict(carried, source=f"{name.name}: rig_axis")
     if axis is not None:
         geometry = replace(geometry, turning_axis=axis)
         found, note = _about_axis(run, geometry, axis)

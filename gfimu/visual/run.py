@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.motion.attitude import from_rotation, to_rotation
 from gfimu.recording import Recording
-from gfimu.recording.reference_times import reference_on_rows
+from gfimu.recording.timing.reference_times import reference_on_rows
 from gfimu.units import STANDARD_GRAVITY
 from gfimu.visual.motion import (
     ExpectedDrift,

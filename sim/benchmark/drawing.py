@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.geometry.array import AccelerometerArray
-from gfimu.recording import Recording
 from gfimu.units import MILLI_G
 from sim.benchmark.generators import foreign_effects, foreign_world, independent_profiles
 from sim.benchmark.generators import independent_effects as table_effects
@@ -24,14 +24,21 @@ from sim.motions.motion import SpinMotion, SplineSpin
 from sim.rigs.dc_motor import DcMotor
 from sim.rigs.driven import drive
 from sim.twin import Twin
-from sim.worlds.hidden import Measurement, detectability, hidden_effect, measure, random_profile, temperature_course
+from sim.worlds.elsewhere import recorded_elsewhere
+from sim.worlds.hidden import (
+    FORMLESS,
+    Measurement,
+    clipped_motion,
+    detectability,
+    hidden_effect,
+    measure,
+    random_profile,
+    temperature_course,
+)
 
-__all__ = ["FORMLESS", "draw", "fresh_motion", "nominal_twin"]
+__all__ = ["draw", "fresh_motion", "nominal_twin"]
 
 Floats = NDArray[np.float64]
-
-FORMLESS = frozenset({"noise", "bias_random_walk", "coarse_resolution", "stuck_channel", "dropped_frames"})
-"""Effects without a noise-free form: no prediction shows them."""
 
 _IN_THE_DRIVE = frozenset({"cogging", "bearing_friction"})
 """Effects that change the motion itself: in a recording of another generator they are part of it."""
@@ -42,7 +49,6 @@ _FRESH = 99  # its stream of chance, apart from the recording's
 _LEAD = 1.5  # s that the motor runs before the recording begins
 _MOTOR_STEP = 5e-4  # physics step of the motor, s
 _TOP_ON_MOTOR = 8.0  # rad/s, which a motor of 24 V reaches
-_CLIPPED_ABOVE, _FASTEST_SHARE = 1.07, 0.02  # of gravity; of the samples that have to be above it
 
 
 def nominal_twin(case: Case) -> Twin:
@@ -69,18 +75,9 @@ def draw(case: Case, attempt: int = 0) -> World:
     if case.generator in {"campaign", "dcmotor"}:
         return _of_campaign(case, twin, case.seed(attempt))
     module = {"table": table_world, "programmed": independent_profiles, "foreign": foreign_world}[case.generator]
-    run = cast(Any, module).hide(
-        case.seed(attempt),
-        case.effects,
-        case.size,
-        duration=case.duration,
-        sample_rate=case.sample_rate,
-        bias_instability_m_s2=case.bias_instability_mg * MILLI_G,
-        tacho_noise_rad_s=case.tacho_noise,
+    recording, run = recorded_elsewhere(
+        cast(Any, module).hide, case.seed(attempt), case.effects, case.size, twin.array, _setting(case)
     )
-    columns = {name: np.asarray(values) for name, values in run.columns.items()}
-    readings = np.column_stack([columns.pop(f"{channel}_m_s2") for channel in twin.array.channels])
-    recording = Recording.from_arrays(columns.pop("t_s"), readings, twin.array, reference=columns)
     motion = SplineSpin.through(recording.t_s, recording.reference["tacho_rad_s"])
     if case.set_name == "unlisted":
         known = UNLISTED_TRUTH[case.effects[0]]
@@ -94,9 +91,8 @@ def _of_campaign(case: Case, twin: Twin, seed: int) -> World:
     """Draw a world of the project's own simulation, on a drawn profile or on one that a motor made of it."""
     rng = np.random.default_rng(seed)
     setting = _setting(case)
-    motion = _motion(rng, case, twin, case.duration)
-    while "saturation" in case.effects and not _reaches(twin, motion, setting, _CLIPPED_ABOVE * twin.gravity):
-        motion = _motion(rng, case, twin, case.duration)
+    drawn = partial(_motion, rng, case, twin, case.duration)
+    motion = clipped_motion(drawn, twin, setting) if "saturation" in case.effects else drawn()
     hidden = [hidden_effect(rng, twin, name, motion, case.size, setting) for name in case.effects]
     recording = measure(rng, twin, hidden, setting, motion=motion)
     sizes = [detectability(twin, [one], motion, setting) for one in hidden if one.name not in FORMLESS]
@@ -140,12 +136,6 @@ class _Later:
 
 def _setting(case: Case) -> Measurement:
     return Measurement(case.duration, case.sample_rate, case.bias_instability_mg * MILLI_G, case.tacho_noise)
-
-
-def _reaches(twin: Twin, motion: SpinMotion, setting: Measurement, level: float) -> bool:
-    """Whether readings go beyond a level, m/s², often enough for clipping there to be seen."""
-    t = np.arange(round(setting.duration * setting.sample_rate)) / setting.sample_rate
-    return bool(np.quantile(np.abs(twin.predict(motion, t)[0]), 1.0 - _FASTEST_SHARE) > level)
 
 
 def fresh_motion(case: Case, truth: Truth, seed: int) -> FreshMotion | None:

@@ -15,7 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from gfimu.errors import GfimuError
+from gfimu.errors import GfimuError, InputError
+from gfimu.geometry.array import AccelerometerArray
 from sim.benchmark.answer import Answer, CauseAnswer
 from sim.benchmark.drawing import fresh_motion, nominal_twin
 from sim.benchmark.real import beyond_stated, held_out_recording, prediction_error, real_task
@@ -23,6 +24,7 @@ from sim.benchmark.release import MEASURED, find_case
 from sim.benchmark.truth_file import Fixed, fixed_world
 from sim.benchmark.world import FreshMotion, Truth
 from sim.effects import Effect, make_effect
+from sim.worlds.z_scores import z_scores
 
 __all__ = ["POINTS", "Claim", "Judged", "claims_of", "judge", "outcome_of"]
 
@@ -50,7 +52,6 @@ LEAST_MOVED = 15.0
 
 _WHERE_NO_NAME_IS_RIGHT = 2.0  # times the points of ``unknown``
 _NOT_A_NAME = "unknown"
-_TURN = 2 * math.pi
 
 
 @dataclass(frozen=True)
@@ -139,7 +140,8 @@ def judge(answers: Iterable[Answer], data: str | Path = "") -> list[Judged]:
     Raises
     ------
     InputError
-        If a world is not of the release, or measured data are needed and not there.
+        If a world is not of the release, an effect has a parameter that it doesn't have on that array, or measured data
+        are needed and not there.
     """
     return [
         _judged_measured(answer, data)
@@ -153,11 +155,12 @@ def _judged_measured(answer: Answer, data: str | Path) -> Judged:
     """Judge an answer for measured data: no truth, but what makers state, and the error on another recording."""
     claims, recording = claims_of(answer), held_out_recording(answer.world, data)
     twin = real_task(answer.world, data).twin
+    hidden = _effects(answer, claims, twin.array)
     if answer.verdict == "error":
         outcome, removed, ratio = "error", math.nan, math.nan
     else:
         outcome = "contradicted" if beyond_stated(answer.causes) else "measured"
-        before, after = (prediction_error(twin, effects, recording) for effects in ((), _effects(claims)))
+        before, after = (prediction_error(twin, effects, recording) for effects in ((), hidden))
         removed = max(1.0 - (after / before) ** 2, -1.0)
         ratio = math.nan if answer.expected_rms_m_s2 is None else answer.expected_rms_m_s2 / after
     said = tuple("|".join(sorted(claim.names)) for claim in claims) or (answer.verdict,)
@@ -176,7 +179,7 @@ def _judged(answer: Answer, fixed: Fixed) -> Judged:
         tuple("|".join(sorted(claim.names)) for claim in claims) or ((answer.verdict,)),
         outcome,
         points,
-        tuple(_z_scores(claims, truth)),
+        tuple(_scores(claims, truth)),
         removed,
         ratio,
         math.nan if answer.processor_s is None else answer.processor_s,
@@ -261,35 +264,22 @@ def _describes(cause: CauseAnswer, truth: Truth) -> bool:
     return cause.effect == "unlisted" and not cause.name and not cause.dependence and cause.place == truth.place
 
 
-def _z_scores(claims: Sequence[Claim], truth: Truth) -> list[float]:
-    """Return (estimate − truth)/std of the sizes of causes that are hidden; angles are compared on the circle."""
-    hidden, scores = dict(truth.hidden), []
+def _scores(claims: Sequence[Claim], truth: Truth) -> list[float]:
+    """Return (estimate − truth)/std of the sizes of causes that are hidden."""
+    hidden, scores = dict(truth.hidden), list[float]()
     for cause in (cause for claim in claims for cause in claim.causes if name_of(cause) in hidden):
-        true = hidden[name_of(cause)]
-        given = {key: one.value for key, one in cause.parameters.items()}
-        # A nod about the opposite direction with the opposite phase is the same nod.
-        direction = given.get("direction_rad", 0.0)
-        turned = float(direction if isinstance(direction, float) else 0.0) - float(true.get("direction_rad", 0.0))
-        opposite = math.pi if math.cos(turned) < 0 else 0.0
-        for key, one in cause.parameters.items():
-            expected = true.get(key, 0.0)
-            if not one.std or not isinstance(one.value, float | int) or not isinstance(expected, float | int):
-                continue
-            error = float(one.value) - float(expected)
-            if key == "phase_rad":
-                error = (error + opposite + math.pi) % _TURN - math.pi
-            elif key == "direction_rad":
-                error = (error + math.pi / 2) % math.pi - math.pi / 2
-            scores.append(error / one.std)
+        values = {key: one.value for key, one in cause.parameters.items()}
+        stds = {key: one.std for key, one in cause.parameters.items()}
+        scores += z_scores(values, stds, hidden[name_of(cause)]).values()
     return scores
 
 
 def _prediction(answer: Answer, claims: Sequence[Claim], fixed: Fixed) -> tuple[float, float]:
     """Return the share of the squared distance that an answer removes in a fresh motion, and the ratio of errors."""
-    fresh = _fresh(answer.world)
+    twin = nominal_twin(fixed.case)
+    effects, fresh = _effects(answer, claims, twin.array), _fresh(answer.world)
     if fresh is None or answer.verdict == "error":
         return math.nan, math.nan
-    twin, effects = nominal_twin(fixed.case), _effects(claims)
     before, after, rms = fresh.distance(twin), math.inf, math.inf
     try:
         with np.errstate(all="ignore"):
@@ -302,20 +292,34 @@ def _prediction(answer: Answer, claims: Sequence[Claim], fixed: Fixed) -> tuple[
     return (max(1.0 - (after / before) ** 2, -1.0) if math.isfinite(after) else -1.0), ratio
 
 
-def _effects(claims: Sequence[Claim]) -> list[Effect]:
-    """Return the effects of an answer, of each claim the first with parameters; a description predicts nothing."""
+def _effects(answer: Answer, claims: Sequence[Claim], array: AccelerometerArray) -> list[Effect]:
+    """Return the effects of an answer, of each claim the first with parameters; a description predicts nothing.
+
+    Raises
+    ------
+    InputError
+        If a parameter is none of its effect on this array: it would change nothing, and pass for a small size.
+    """
     found = []
     for claim in claims:
-        for cause in claim.causes:
+        sized = [cause for cause in claim.causes if cause.parameters and _is_effect(name_of(cause))]
+        effects = []
+        for cause in sized:
             values = {key: one.value for key, one in cause.parameters.items()}
             try:
-                effect = make_effect(name_of(cause), values)
-            except GfimuError:
-                continue
-            if values:
-                found.append(effect)
-                break
+                effects.append(make_effect(name_of(cause), values, array))
+            except GfimuError as error:
+                raise InputError(f"answer for {answer.world}: {error}") from None
+        found += effects[:1]
     return found
+
+
+def _is_effect(name: str) -> bool:
+    try:
+        make_effect(name)
+    except GfimuError:
+        return False
+    return True
 
 
 @functools.lru_cache(maxsize=512)

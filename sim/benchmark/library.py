@@ -7,7 +7,7 @@ else, or taken from the smoothed tachometer.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -20,18 +20,29 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.sparse import csr_array
 from scipy.stats import norm
 
+from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
 from sim.effects import Effect
 from sim.motions.motion import SpinMotion, SplineSpin
 from sim.twin import Twin
 
-__all__ = ["Block", "Candidate", "FreeDrive", "KnownDrive", "LinearLibrary", "fitted_sizes", "motion_columns"]
+__all__ = [
+    "Block",
+    "Candidate",
+    "FreeDrive",
+    "KnownDrive",
+    "LinearLibrary",
+    "fitted_sizes",
+    "motion_columns",
+    "stated_parameters",
+]
 
 Floats = NDArray[np.float64]
 
 _SMOOTHING = 0.03  # of the tachometer, s
 _STEP = 0.1  # finite difference as a share of the prior's standard deviation
 _KNOTS_S = 0.03  # distance of the knots of a free motion
+_SLOPE = 1e-4  # step of the slope of a parameter, in standard deviations of a size
 _NEAR = 0.02  # the same about effects that are large already
 _SINGULAR = 1e-10  # numerical: singular values below this share count as zero
 _SEEN = 1e-6  # standard deviation as a share of the prior below which a size was left out, not measured
@@ -148,7 +159,7 @@ class Block:
     columns : slice
         Where its columns stand.
     keys : tuple of str
-        Contract key of each size.
+        Name of each size.
     places : tuple of ndarray, each of shape (m, k)
         Mixing matrices of the places that its sizes may be confined to.
     """
@@ -202,6 +213,8 @@ class LinearLibrary:
         Number of readings.
     chi2 : float
         Sum of squares of the residual, in units of the noise.
+    array : AccelerometerArray
+        Array of the twin.
     """
 
     blocks: tuple[Block, ...]
@@ -210,6 +223,7 @@ class LinearLibrary:
     scale: Floats
     samples: int
     chi2: float
+    array: AccelerometerArray
 
     @classmethod
     def of(cls, recording: Recording, twin: Twin, *, free_motion: bool = False) -> LinearLibrary:
@@ -242,7 +256,7 @@ class LinearLibrary:
         else:
             products = design.T @ design, design.T @ whitened, float(whitened @ whitened)
         gram, score, chi2 = products
-        return cls(tuple(blocks), gram, score, np.array(scale), residual.size, chi2)
+        return cls(tuple(blocks), gram, score, np.array(scale), residual.size, chi2, twin.array)
 
     @cached_property
     def candidates(self) -> tuple[Candidate, ...]:
@@ -262,27 +276,63 @@ class LinearLibrary:
         return float(score @ np.linalg.pinv(mixing.T @ self.gram @ mixing, rcond=_SINGULAR) @ score)
 
     def fit(self, chosen: Sequence[Candidate]) -> tuple[Floats, Floats]:
-        """Return the sizes (m,) of a least-squares fit in units of the prior, and their standard deviations (m,)."""
+        """Return the sizes (m,) of a least-squares fit in units of the prior, and their covariance (m, m)."""
         mixing = np.hstack([one.spread for one in chosen])
         covariance = np.linalg.pinv(mixing.T @ self.gram @ mixing, rcond=_SINGULAR)
-        estimate = mixing @ (covariance @ (mixing.T @ self.score))
-        return estimate, np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", mixing, covariance, mixing), 0.0))
+        return mixing @ (covariance @ (mixing.T @ self.score)), mixing @ covariance @ mixing.T
 
     def causes(self, chosen: Sequence[Candidate]) -> list[dict[str, Any]]:
         """Return the causes of an answer: the terms with their fitted sizes, standard deviations and shapes."""
-        estimate, std = self.fit(chosen) if chosen else (np.empty(0), np.empty(0))
         causes: list[dict[str, Any]] = []
+        if not chosen:
+            return causes
+        estimate, covariance = self.fit(chosen)
         for block in {one.effect: one.block for one in chosen}.values():
-            scale = self.scale[block.columns]
-            sizes = zip(block.keys, estimate[block.columns] * scale, std[block.columns] * scale, scale, strict=True)
-            parameters: dict[str, Any] = {
-                key: {"value": float(value), "std": float(spread)}
-                for key, value, spread, prior in sizes
-                if spread / prior > _SEEN
-            }
-            parameters |= {key: {"value": value} for key, value in block.shape.items()}
+            here, scale = block.columns, self.scale[block.columns]
+            spread = covariance[here, here] * np.outer(scale, scale)
+            parameters = stated_parameters(block.family, self.array, estimate[here] * scale, spread, block.shape)
             causes.append({"effect": block.family.name, "parameters": parameters})
         return causes
+
+
+def stated_parameters(
+    family: type[Effect], array: AccelerometerArray, sizes: Floats, covariance: Floats, shape: Mapping[str, float]
+) -> dict[str, dict[str, float]]:
+    """Return the parameters of an effect in the contract's keys, with standard deviations to first order.
+
+    Parameters
+    ----------
+    family : type of Effect
+        The kind of effect.
+    array : AccelerometerArray
+        The array.
+    sizes, covariance : ndarray, shapes (k,) and (k, k)
+        Linear coordinates, as of `sim.effects.Effect.from_sizes`, and their covariance.
+    shape : mapping of str to float
+        Shape parameters.
+    """
+    keys = [key for key in family.from_sizes(array, sizes, shape).parameters if key not in shape]
+
+    def values(at: Floats) -> Floats:
+        found = family.from_sizes(array, at, shape)
+        return np.array([found.value(key) for key in keys])
+
+    found, slopes = values(sizes), np.zeros((len(keys), len(sizes)))
+    for place, std in enumerate(np.sqrt(np.maximum(np.diag(covariance), 0.0))):
+        if std > 0.0:
+            moved = sizes.copy()
+            moved[place] += _SLOPE * std
+            change = values(moved) - found
+            turned = [key == "phase_rad" for key in keys]  # a phase may jump by a turn
+            slopes[:, place] = np.where(turned, np.angle(np.exp(1j * change)), change) / (_SLOPE * std)
+    stds = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", slopes, covariance, slopes), 0.0))
+    least = {size.key: _SEEN * size.prior_std for size in family.sizes(array)}
+    parameters = {
+        key: {"value": float(value), "std": float(std)}
+        for key, value, std in zip(keys, found, stds, strict=True)
+        if std > least.get(key, 0.0)
+    }
+    return parameters | {key: {"value": value} for key, value in shape.items()}
 
 
 def fitted_sizes(recording: Recording, twin: Twin, effects: Sequence[Effect]) -> list[dict[str, Any]]:
@@ -308,15 +358,16 @@ def fitted_sizes(recording: Recording, twin: Twin, effects: Sequence[Effect]) ->
         columns.append((drive.predicted(*moved) - begun) / _NEAR)
     design = np.column_stack(columns) if columns else np.zeros((begun.size, 0))
     gram, score, _ = drive.products(design, np.nan_to_num(drive.measured - begun))
-    covariance = np.linalg.pinv(gram, rcond=_SINGULAR, hermitian=True)
-    step, std = covariance @ score, np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    causes: list[dict[str, Any]] = [
-        {"effect": one.name, "parameters": {key: {"value": value} for key, value in one.parameters.items()}}
-        for one in effects
-    ]
-    for column, (number, place, size) in enumerate(sizes):
-        value = effects[number].size_values(array)[place] + step[column] * size.prior_std
-        causes[number]["parameters"][size.key] = {"value": float(value), "std": float(std[column] * size.prior_std)}
+    scale = np.array([size.prior_std for _, _, size in sizes])
+    covariance = np.asarray(np.linalg.pinv(gram, rcond=_SINGULAR, hermitian=True) * np.outer(scale, scale), float)
+    step = covariance @ (score / scale)
+    causes: list[dict[str, Any]] = []
+    for number, one in enumerate(effects):
+        given = {key: {"value": value} for key, value in one.parameters.items()}
+        here = [column for column, (owner, _, _) in enumerate(sizes) if owner == number]
+        fitted = one.size_values(array) + step[here]
+        found = stated_parameters(type(one), array, fitted, covariance[np.ix_(here, here)], one.shape_values())
+        causes.append({"effect": one.name, "parameters": given | (found if here else {})})
     return causes
 
 

@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
-from sim.benchmark.drawing import FORMLESS
 from sim.benchmark.library import motion_columns
 from sim.benchmark.world import World
 from sim.effects import Effect, make_effect
 from sim.motions.motion import SpinMotion
 from sim.twin import Twin
+from sim.worlds.hidden import FORMLESS
 
 __all__ = ["LEAST_SEPARABLE", "free_distance_and_ties"]
 

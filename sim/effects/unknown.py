@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.errors import InputError
-from gfimu.generic_basis import OF_READING, Motion, basis_function, is_of_time
+from gfimu.generic_basis import OF_READING, UNIT_KEYS, Motion, basis_function, is_of_time, unit_parameters
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.units import NAME, STANDARD_GRAVITY
 from gfimu.world_model import BasisUnits, SpinState
@@ -22,7 +22,6 @@ __all__ = ["Unknown", "UnknownTerm"]
 
 _REFERENCE = Size("reference_rad_s", "rad/s", 0.1)
 _USUAL = 0.1  # m/s²
-_UNITS = {"rate_unit_rad_s": "rad/s", "acceleration_unit_rad_s2": "rad/s²", "duration_s": "s"}
 
 
 class Unknown(Effect):
@@ -44,7 +43,7 @@ class Unknown(Effect):
     summary = "a dependence that the data show and nothing in the library explains"
     place = "sensing"
     separated_by = "another run with another motion: what stays is in the rig or the sensors"
-    other_units: ClassVar = {"dependence": NAME, **_UNITS}
+    other_units: ClassVar = {"dependence": NAME, **UNIT_KEYS}
 
     @classmethod
     def sizes(cls, array: AccelerometerArray) -> tuple[Size, ...]:
@@ -54,13 +53,13 @@ class Unknown(Effect):
     @property
     def units(self) -> BasisUnits:
         """What rate, acceleration and time are divided by."""
-        return BasisUnits(*(self.value(key, 1.0) for key in _UNITS))
+        return BasisUnits(*(self.value(key, 1.0) for key in UNIT_KEYS))
 
     def check(self, array: AccelerometerArray) -> None:
         """Raise `InputError` for a wrong key, a function that isn't there or a unit that is not positive."""
         super().check(array)
         self._function()
-        for key in _UNITS:
+        for key in UNIT_KEYS:
             value = self.value(key, 1.0)
             if not (math.isfinite(value) and value > 0):
                 raise InputError(f"effect {self.name!r}: {key} must be a positive number, not {value!r}")
@@ -122,8 +121,7 @@ class UnknownTerm:
 
     def __call__(self, parameters: Mapping[str, Any]) -> Effect:
         """Build the effect from its coefficients."""
-        units = dict(zip(_UNITS, (self.units.rate, self.units.acceleration, self.units.duration), strict=True))
-        return Unknown({"dependence": self.dependence, **units, **parameters})
+        return Unknown({"dependence": self.dependence, **unit_parameters(self.units), **parameters})
 
     def sizes(self, array: AccelerometerArray) -> tuple[Size, ...]:
         """Return the sizes of the channels, or the one of the reference."""

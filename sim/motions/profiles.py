@@ -19,6 +19,7 @@ from scipy.spatial.transform import Rotation
 from scipy.special import ellipj, ellipk
 
 from gfimu.errors import InputError
+from gfimu.geometry.smooth_ramp import smooth_ramp
 from sim.motions.motion import BodyState, SplineSpin
 
 __all__ = ["Chirp", "Hold", "Ramp", "Segment", "Sine", "Tumble", "paper_run", "speed_sweep", "spin_profile"]
@@ -350,12 +351,9 @@ def _smooth_step(share: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _quintic(start: float, stop: float, duration: float) -> NDArray[np.float64]:
     """Coefficients of one quintic piece from ``start`` to ``stop``, highest power first, shape (6, 1)."""
-    step = stop - start
     if not _SHORTEST < duration < _LONGEST:
         raise InputError(f"a piece of {duration:g} s; give more than {_SHORTEST:g} s and less than {_LONGEST:g} s")
-    return np.array(
-        [[6 * step / duration**5], [-15 * step / duration**4], [10 * step / duration**3], [0], [0], [start]]
-    )
+    return smooth_ramp(start, stop, duration)[:, None]
 
 
 def _raised_to_quintic(coefficients: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1,7 +1,7 @@
 """What simpler methods make of the same recordings.
 
 Greedy selection by BIC and least squares with everything at once see the same library as the diagnosis; MuJoCo's system
-identification names nothing and is told the right parameters. All take the smoothed tachometer for the drive and white
+identification names nothing and is given the right parameters. All take the smoothed tachometer for the drive and white
 noise, as is usual.
 """
 
@@ -65,7 +65,9 @@ def _greedy_bic(world: HiddenWorld) -> list[dict[str, Any]]:
         chosen.append(library.candidates[best])
     if not chosen:
         return []
-    return _causes(library, {one.effect: one.block for one in chosen}, *library.fit(chosen), dict(world.truth))
+    estimate, covariance = library.fit(chosen)
+    std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    return _causes(library, {one.effect: one.block for one in chosen}, estimate, std, dict(world.truth))
 
 
 def _everything(world: HiddenWorld) -> list[dict[str, Any]]:
@@ -112,11 +114,11 @@ def _causes(
     return causes
 
 
-def _told_sysid(world: HiddenWorld) -> list[dict[str, Any]]:
+def _sysid_of_given_name(world: HiddenWorld) -> list[dict[str, Any]]:
     """Let MuJoCo's system identification fit the sizes that are hidden, in the right place and shape.
 
     Its optimiser, weights and intervals; the predictions are those of the analytic model, which agrees with MuJoCo to
-    1e-9 m/s². Only a single effect with sizes can be told to it.
+    1e-9 m/s². Only a single effect with sizes can be given to it.
     """
     if len(world.truth) != 1:
         return []
@@ -132,5 +134,5 @@ def _told_sysid(world: HiddenWorld) -> list[dict[str, Any]]:
     return [{"effect": name, "place": "", "probability": 1.0, "log_odds": None, "rivals": [], "z": scores}]
 
 
-METHODS = {"greedy BIC": _greedy_bic, "everything at once": _everything, "mujoco.sysid, told": _told_sysid}
+METHODS = {"greedy BIC": _greedy_bic, "everything at once": _everything, "mujoco.sysid, told": _sysid_of_given_name}
 """Simpler methods by name."""

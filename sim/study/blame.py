@@ -23,7 +23,7 @@ from gfimu.diagnosis.terms.cause import Cause
 from sim.effects import Effect, make_effect
 from sim.study.cases import Case
 from sim.study.outcome import HiddenWorld, draw_world
-from sim.study.report import Outcome, score, visible
+from sim.study.tally import Outcome, score, visible
 
 __all__ = ["blame_of", "is_miss", "truth_over_found"]
 

@@ -17,7 +17,8 @@ from gfimu.files.model_files import find_model, read_toml
 from gfimu.recording import Recording
 from gfimu.units import MILLI_G
 from sim.effects import BODY_EFFECTS, Effect, make_effect
-from sim.scenarios import Scenario, simulate
+from sim.scenarios import Scenario
+from sim.simulation import simulate
 from sim.study.cases import BODY_PARTS, Case
 from sim.twin import Twin
 from sim.worlds.hidden import discrete_parameters

@@ -120,7 +120,7 @@ class Case:
 
 
 def _noise_of(number: int) -> dict[str, Any]:
-    """Return one of three noise levels in turn; the tool is told none of them."""
+    """Return one of three noise levels in turn; the diagnosis is given none of them."""
     level = ((0.05, 0.02), (0.15, 0.02), (0.5, 0.02))[number % 3]
     return {"bias_instability_mg": level[0], "tacho_noise": level[1]}
 

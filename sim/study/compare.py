@@ -14,7 +14,7 @@ from scipy.stats import binom
 
 from gfimu.errors import InputError
 from sim.study.outcome_file import generator_name, read_outcomes
-from sim.study.report import LEAST_APART, Outcome, Tally, rate_with_interval, score, visible
+from sim.study.tally import LEAST_APART, Outcome, Tally, rate_with_interval, score, visible
 
 __all__ = ["POLICY", "Comparison", "Policy", "Promise", "compare", "load_outcomes"]
 
@@ -223,10 +223,10 @@ def _said(outcome: Outcome) -> str:
 
 
 def _differs(old: Outcome, new: Outcome) -> bool:
-    def told(outcome: Outcome) -> tuple[object, ...]:
+    def answer(outcome: Outcome) -> tuple[object, ...]:
         return outcome["verdict"], {cause["effect"] for cause in outcome["causes"]}, tuple(score(outcome).values())
 
-    return told(old) != told(new)
+    return answer(old) != answer(new)
 
 
 def _compare_list(

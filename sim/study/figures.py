@@ -46,10 +46,10 @@ def draw_detection(by_size: Sequence[tuple[float, Sequence[Mapping[str, bool]]]]
 def draw_confusion(pairs: Sequence[tuple[str, str]], path: Path) -> Path:
     """Draw how often each hidden effect (row) was named as what (column), as shares of its runs."""
     rows = sorted({hidden for hidden, _ in pairs})
-    columns = [*rows, *sorted({told for _, told in pairs} - set(rows))]
+    columns = [*rows, *sorted({said for _, said in pairs} - set(rows))]
     shares = np.zeros((len(rows), len(columns)))
-    for hidden, told in pairs:
-        shares[rows.index(hidden), columns.index(told)] += 1.0
+    for hidden, said in pairs:
+        shares[rows.index(hidden), columns.index(said)] += 1.0
     shares /= shares.sum(axis=1, keepdims=True)
     figure, axes = _axes(0.22 * len(columns) + 3.0, 0.22 * len(rows) + 3.0)
     axes.imshow(shares, cmap="Blues", vmin=0.0, vmax=1.0)

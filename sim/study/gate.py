@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from sim.study.cases import STUDIES, Case, find_case
-from sim.study.report import LEAST_VISIBLE
+from sim.study.tally import LEAST_VISIBLE
 
 __all__ = ["GATE", "STRATA", "Stratum", "choose_gate", "gate_cases"]
 

@@ -6,6 +6,7 @@ import os
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ import numpy as np
 from gfimu.diagnosis.design.distinguishability import energy_left, normal_equations, plan_contenders
 from gfimu.diagnosis.design.planned_run import PlannedRun, planned
 from gfimu.diagnosis.verdict.library import standing_out
-from gfimu.diagnosis.verdict.verdict import Diagnosis, NamedCause
+from gfimu.diagnosis.verdict.verdict import Diagnosis
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.plugins import function_of_file
 from gfimu.recording import Recording
@@ -24,19 +25,24 @@ from sim.motions.motion import SpinMotion
 from sim.study.bodies import body_twin, draw_body
 from sim.study.cases import Case
 from sim.twin import Twin
-from sim.worlds.hidden import Measurement, detectability, hidden_effect, measure, random_profile
+from sim.worlds.elsewhere import recorded_elsewhere
+from sim.worlds.hidden import (
+    FORMLESS,
+    Measurement,
+    clipped_motion,
+    detectability,
+    hidden_effect,
+    measure,
+    random_profile,
+)
+from sim.worlds.z_scores import z_scores
 
 __all__ = ["HiddenWorld", "SmallerLibrary", "draw_world", "outcome_of", "run_case"]
 
 _TURN = 2 * np.pi
 _SHAPES = frozenset(("frequency_hz", "damping_ratio", "order", "width_m_s2", "time_constant_s"))
-_CLIPPED_ABOVE = 1.07
-_FASTEST_SHARE = 0.02
 _LONGEST_PLANNED = 120.0  # s: a planned run has one drive, whose normal equations grow with its square
 _CLOSEST = 8  # of the other effects, of which one is taken into every pair
-_WITHOUT_NOISE_FREE_FORM = frozenset(
-    {"noise", "bias_random_walk", "coarse_resolution", "stuck_channel", "dropped_frames"}
-)
 
 
 @dataclass(frozen=True)
@@ -102,9 +108,6 @@ def draw_world(case: Case, source: str = "") -> HiddenWorld:
         without=case.without,
         drive_source="angle" if case.encoder_counts else "tacho",
     )
-    if source:
-        return _foreign_world(case, twin, source)
-    rng = np.random.default_rng(case.seed)
     setting = Measurement(
         case.duration,
         case.sample_rate,
@@ -112,17 +115,17 @@ def draw_world(case: Case, source: str = "") -> HiddenWorld:
         case.tacho_noise,
         encoder_step=_TURN / case.encoder_counts if case.encoder_counts else 0.0,
     )
-    motion = random_profile(rng, case.duration)
-    while "saturation" in case.effects and not _reaches(twin, motion, setting, _CLIPPED_ABOVE * twin.gravity):
-        motion = random_profile(rng, case.duration)
+    if source:
+        hide = function_of_file(source, "a generator")
+        recording, run = recorded_elsewhere(hide, case.seed, case.effects, case.size, twin.array, setting)
+        return HiddenWorld(recording, twin, tuple(run.truth), run.detectability)
+    rng = np.random.default_rng(case.seed)
+    drawn = partial(random_profile, rng, case.duration)
+    motion = clipped_motion(drawn, twin, setting) if "saturation" in case.effects else drawn()
     hidden = [hidden_effect(rng, twin, name, motion, case.size, setting) for name in case.effects]
     residue = calibration_residue(rng, twin.array) if case.residue else []
     recording = measure(rng, twin, [*residue, *hidden], setting, motion=motion)
-    sizes = [
-        detectability(twin, [effect], motion, setting)
-        for effect in hidden
-        if effect.name not in _WITHOUT_NOISE_FREE_FORM
-    ]
+    sizes = [detectability(twin, [effect], motion, setting) for effect in hidden if effect.name not in FORMLESS]
     truth = tuple((effect.name, effect.parameters) for effect in hidden)
     world = HiddenWorld(recording, twin, truth, min(sizes, default=np.inf))
     if len(hidden) == 1 and sizes and hidden[0].sizes(twin.array) and case.duration <= _LONGEST_PLANNED:
@@ -138,7 +141,7 @@ def _with_limits(
     rivals = [
         name
         for name, family in twin.families().items()
-        if name not in {hidden.name, *_WITHOUT_NOISE_FREE_FORM} and family.sizes(twin.array)
+        if name not in {hidden.name, *FORMLESS} and family.sizes(twin.array)
     ]
     run = PlannedRun(
         motion,
@@ -169,28 +172,6 @@ def _with_limits(
         left_by=dict(zip(rivals, left.tolist(), strict=True)),
         left_by_two=by_two,
     )
-
-
-def _reaches(twin: Twin, motion: SpinMotion, setting: Measurement, level: float) -> bool:
-    """Whether readings go beyond a level, m/s², often enough for clipping there to be seen."""
-    t = np.arange(round(setting.duration * setting.sample_rate)) / setting.sample_rate
-    return bool(np.quantile(np.abs(twin.predict(motion, t)[0]), 1.0 - _FASTEST_SHARE) > level)
-
-
-def _foreign_world(case: Case, twin: Twin, source: str) -> HiddenWorld:
-    run = function_of_file(source, "a generator")(
-        case.seed,
-        case.effects,
-        case.size,
-        duration=case.duration,
-        sample_rate=case.sample_rate,
-        bias_instability_m_s2=case.bias_instability_mg * MILLI_G,
-        tacho_noise_rad_s=case.tacho_noise,
-    )
-    columns = {name: np.asarray(values) for name, values in run.columns.items()}
-    readings = np.column_stack([columns.pop(f"{channel}_m_s2") for channel in twin.array.channels])
-    recording = Recording.from_arrays(columns.pop("t_s"), readings, twin.array, reference=columns)
-    return HiddenWorld(recording, twin, tuple(run.truth), run.detectability)
 
 
 def run_case(case: Case, source: str = "") -> dict[str, Any]:
@@ -233,7 +214,7 @@ def outcome_of(diagnosis: Diagnosis, truth: Sequence[tuple[str, Mapping[str, Any
     hidden = dict(truth)
     causes = []
     for cause in diagnosis.causes:
-        scores = z_scores(cause, hidden[cause.effect]) if cause.effect in hidden else {}
+        scores = z_scores(cause.parameters, cause.std, hidden[cause.effect]) if cause.effect in hidden else {}
         causes.append(
             {
                 "effect": cause.effect,
@@ -263,28 +244,6 @@ def outcome_of(diagnosis: Diagnosis, truth: Sequence[tuple[str, Mapping[str, Any
         "noise": dict(diagnosis.noise),
         "truth": {name: {key: _plain(value) for key, value in parameters.items()} for name, parameters in truth},
     }
-
-
-def z_scores(cause: NamedCause, truth: Mapping[str, Any]) -> dict[str, float]:
-    """Return (estimate − truth)/std for every parameter with a standard deviation; angles are compared on the circle.
-
-    A parameter that the verdict leaves out is compared as zero, where a standard deviation is given for it.
-    """
-    # A nod about the opposite direction with the opposite phase is the same nod.
-    turned = float(cause.parameters.get("direction_rad", 0.0)) - float(truth.get("direction_rad", 0.0))
-    opposite = np.pi if np.cos(turned) < 0 else 0.0
-    scores = {}
-    for key, std in cause.std.items():
-        estimate, true = cause.parameters.get(key, 0.0), truth.get(key, 0.0)
-        if not isinstance(estimate, int | float) or not isinstance(true, int | float) or not std or std <= 0:
-            continue
-        error = float(estimate) - float(true)
-        if key == "phase_rad":
-            error = (error + opposite + np.pi) % _TURN - np.pi
-        elif key == "direction_rad":
-            error = (error + np.pi / 2) % np.pi - np.pi / 2
-        scores[key] = error / std
-    return scores
 
 
 def _plain(value: Any) -> Any:

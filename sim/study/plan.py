@@ -20,7 +20,7 @@ from sim.study.blame import blame_of, is_miss
 from sim.study.cases import find_case, study_cases
 from sim.study.gate import GATE, gate_cases
 from sim.study.outcome import run_case
-from sim.study.report import brief
+from sim.study.tally import brief
 from sim.sweep.design import Case
 from sim.sweep.plan import PlanFile
 

@@ -4,162 +4,25 @@ from __future__ import annotations
 
 import itertools
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import beta
 
 from gfimu.errors import InputError
 from gfimu.files.atomic_file import write_text
 from sim.study.figures import draw_confusion, draw_detection, draw_reliability
 from sim.study.outcome_file import keep_outcomes
+from sim.study.tally import LEAST_APART, LEAST_VISIBLE, Outcome, Tally, rate_with_interval, score, visible
 
-__all__ = ["Tally", "brief", "rate_with_interval", "score", "summarise", "visible", "write_report"]
-
-Outcome = Mapping[str, Any]
-
-INSEPARABLE = (
-    frozenset({"bias", "scale_factor", "quadratic", "cross_axis", "gravity"}),
-    frozenset({"mount_tilt", "misalignment"}),
-    frozenset({"eccentricity", "sensor_position"}),
-)
-"""Effects that one upright run can't tell apart on channels that see constant gravity, or that contain each other.
-
-For sets of which what each leaves of the other was not computed.
-"""
-
-LEAST_SEPARABLE = 3.0
-"""Size d′ below which what a rival leaves of an effect, the drive unknown, does not tell them apart.
-
-The log odds of an ideal observer are 4.5 ± 3 there.
-"""
+__all__ = ["reliability", "summarise", "write_report"]
 
 _REMARKS = "<!-- remarks, kept by the report -->"
 _END_OF_REMARKS = "<!-- end of remarks -->"
 
 _DRIVE_UNKNOWN = (0.0, 5.0, 7.0, 10.0, 15.0, 60.0, np.inf)
-
-LEAST_APART = 15.0
-"""Size d′ that the best other effect must leave of one taken out of the library for it to have a signature of its own;
-just detectable."""
-
-LEAST_VISIBLE = 7.0
-"""Size d′ below which an effect is at or below the information limit."""
-_ROUNDED = 1e-5  # of a size that is kept
-
-
-def score(outcome: Outcome) -> dict[str, bool]:
-    """Judge one outcome.
-
-    Returns
-    -------
-    dict
-        ``exact``: the right names alone (nothing found where nothing is hidden). ``within``: every hidden effect is
-        among the names or among what is told as not distinguishable from them. ``wrong``: said to be explained, with a
-        name that is not hidden. ``fair``: exact, or a set of effects that one upright run truly can't tell apart, the
-        hidden one among them. ``named``, ``nothing``, ``unknown``, ``set``, ``error``: what was said.
-    """
-    hidden = set(outcome["effects"])
-    names = {cause["effect"] for cause in outcome["causes"]}
-    told = names.union(*(cause["rivals"] for cause in outcome["causes"]))
-    verdict = outcome["verdict"]
-    explained = verdict == "explained"
-    exact = (explained and names == hidden) if hidden else verdict == "nothing_found"
-    same = verdict == "ambiguous" and hidden <= told and _inseparable(outcome, told - hidden)
-    return {
-        "exact": exact,
-        "fair": exact or same,
-        "within": (verdict in {"explained", "ambiguous"} and hidden <= told) if hidden else verdict == "nothing_found",
-        "wrong": explained and not names <= hidden,
-        "named": verdict in {"explained", "ambiguous"},
-        "set": verdict == "ambiguous",
-        "nothing": verdict == "nothing_found",
-        "unknown": verdict == "unknown",
-        "error": verdict == "error",
-    }
-
-
-def brief(outcome: Outcome) -> dict[str, Any]:
-    """Return what was said, the names as one text, and whether it was exactly right or wrong (`score`)."""
-    judged, names = score(outcome), sorted(cause["effect"] for cause in outcome["causes"])
-    return {
-        "verdict": outcome["verdict"],
-        "causes": ", ".join(names),
-        "exact": judged["exact"],
-        "wrong": judged["wrong"],
-    }
-
-
-def _inseparable(outcome: Outcome, rivals: set[str]) -> bool:
-    """Whether the data can't tell any of these rivals from what is hidden."""
-    left_by = outcome.get("left_by")
-    if not left_by:
-        return any(rivals | set(outcome["effects"]) <= group for group in INSEPARABLE)
-    return all(left_by.get(rival, np.inf) < LEAST_SEPARABLE for rival in rivals)
-
-
-def visible(outcome: Outcome) -> bool:
-    """Whether what is hidden can be seen in the recording at all."""
-    reached = outcome.get("reached")
-    return reached is None or reached >= (1.0 - _ROUNDED) * LEAST_VISIBLE
-
-
-def rate_with_interval(hits: int, cases: int) -> tuple[float, float, float]:
-    """Return a rate and its 95 % interval (Clopper & Pearson 1934)."""
-    low = float(beta.ppf(0.025, hits, cases - hits + 1)) if hits else 0.0
-    high = float(beta.ppf(0.975, hits + 1, cases - hits)) if hits < cases else 1.0
-    return (hits / cases if cases else float("nan")), low, high
-
-
-class Tally:
-    """Outcomes of one study.
-
-    Parameters
-    ----------
-    outcomes : sequence of mapping
-        Outcomes as `run_case` returns them.
-    """
-
-    def __init__(self, outcomes: Sequence[Outcome]) -> None:
-        self.outcomes = outcomes
-        self.scores = [score(outcome) for outcome in outcomes]
-
-    def __len__(self) -> int:
-        return len(self.outcomes)
-
-    def share(self, what: str) -> str:
-        """Return a rate in per cent with its interval, as text."""
-        hits = sum(entry[what] for entry in self.scores)
-        rate, low, high = rate_with_interval(hits, len(self))
-        return f"{100 * rate:.1f} ({100 * low:.0f}–{100 * high:.0f})"
-
-    def numbers(self, key: str) -> NDArray[np.float64]:
-        """Return the values of a number in the outcomes, where there is one."""
-        values = [outcome.get(key) for outcome in self.outcomes]
-        return np.array([value for value in values if value is not None], dtype=float)
-
-    def z(self) -> NDArray[np.float64]:
-        """Return |error|/std of all parameters of rightly named causes."""
-        return np.array(
-            [
-                abs(value)
-                for outcome, entry in zip(self.outcomes, self.scores, strict=True)
-                if entry["exact"]
-                for cause in outcome["causes"]
-                for value in cause["z"].values()
-            ]
-        )
-
-    def told(self, outcome: Outcome) -> str:
-        """Return what was said, in a word or two."""
-        words = {"nothing_found": "nothing", "unknown": "unknown", "error": "error"}
-        if outcome["verdict"] in words:
-            return words[outcome["verdict"]]
-        names = " + ".join(sorted({cause["effect"] for cause in outcome["causes"]}))
-        return f"one of {names}" if outcome["verdict"] == "ambiguous" else names
 
 
 def _by(outcomes: Iterable[Outcome], *keys: str) -> dict[tuple[Any, ...], list[Outcome]]:
@@ -230,7 +93,14 @@ def _noise_levels(outcomes: Sequence[Outcome]) -> str:
         tally = Tally(group)
         loose = sum(bool(outcome["noise"].get("calibration_residue")) for outcome in group if "noise" in outcome)
         rows.append((level, tacho, len(tally), tally.share("named"), tally.share("unknown"), loose))
-    header = ("bias instability, mg", "tachometer noise, rad/s", "runs", "named %", "unknown %", "residue told in")
+    header = (
+        "bias instability, mg",
+        "tachometer noise, rad/s",
+        "runs",
+        "named %",
+        "unknown %",
+        "calibration residue in",
+    )
     return "## Nothing hidden\n\n" + _table(header, rows) if rows else ""
 
 
@@ -241,12 +111,12 @@ def _misses(outcomes: Sequence[Outcome]) -> str:
     for (effect,), group in sorted(_by([{**o, "effect": o["effects"][0]} for o in single], "effect").items()):
         tally = Tally(group)
         other = Counter(
-            f"{tally.told(outcome)} (d′ {outcome['size']:.0f})" if outcome["size"] else tally.told(outcome)
+            f"{tally.words(outcome)} (d′ {outcome['size']:.0f})" if outcome["size"] else tally.words(outcome)
             for outcome, entry in zip(tally.outcomes, tally.scores, strict=True)
             if not entry["exact"]
         )
-        told = "; ".join(f"{name} × {count}" if count > 1 else name for name, count in other.most_common())
-        rows.append((f"`{effect}`", len(tally), tally.share("exact"), tally.share("within"), told))
+        named = "; ".join(f"{name} × {count}" if count > 1 else name for name, count in other.most_common())
+        rows.append((f"`{effect}`", len(tally), tally.share("exact"), tally.share("within"), named))
     header = ("hidden", "runs", "right alone %", "right in the set %", "what was said otherwise")
     return _drive_unknown(single) + "## One effect hidden: what was said\n\n" + _table(header, rows) if rows else ""
 
@@ -270,7 +140,7 @@ def _left_out(outcomes: Sequence[Outcome]) -> str:
     rows = []
     for (effect,), group in sorted(_by([{**o, "effect": o["effects"][0]} for o in outside], "effect").items()):
         tally = Tally(group)
-        said = Counter(tally.told(outcome) for outcome in tally.outcomes)
+        said = Counter(tally.words(outcome) for outcome in tally.outcomes)
         rows.append(
             (f"`{effect}`", len(tally), tally.share("unknown"), "; ".join(f"{k} × {v}" for k, v in said.most_common()))
         )
@@ -289,20 +159,20 @@ def _left_out(outcomes: Sequence[Outcome]) -> str:
         ],
         f"taken out, d′ > {2 * LEAST_APART:g} left by the best other effect": taken(2 * LEAST_APART),
         f"taken out, d′ {LEAST_APART:g} to {2 * LEAST_APART:g} left": taken(LEAST_APART, 2 * LEAST_APART),
-        "taken out, imitated by one other effect": taken(0.0, LEAST_APART),
+        "taken out, confounded with one other effect": taken(0.0, LEAST_APART),
     }
     totals = [(f"**{name}**", len(group), Tally(group).share("unknown"), "") for name, group in groups.items() if group]
     return "## Outside the library\n\n" + _table(header, [*totals, *rows]) if rows else ""
 
 
 def _several(outcomes: Sequence[Outcome]) -> str:
-    """Tell each run with two or three hidden effects that was not named right alone."""
+    """List each run with two or three hidden effects that was not named right alone."""
     rows = []
     for outcome in outcomes:
         tally = Tally([outcome])
         if outcome["study"] in {"pairs", "triples"} and not tally.scores[0]["exact"]:
             hidden = " + ".join(sorted(outcome["effects"]))
-            rows.append((outcome["study"], f"{outcome['size']:.0f}", hidden, tally.told(outcome)))
+            rows.append((outcome["study"], f"{outcome['size']:.0f}", hidden, tally.words(outcome)))
     header = ("study", "d′ of each", "hidden", "said")
     return (
         "## Two and three effects hidden: what was not named right alone\n\n" + _table(header, sorted(rows))
@@ -358,7 +228,7 @@ def summarise(outcomes: Sequence[Outcome]) -> str:
     return (
         "## Overview\n\nRates in per cent with their 95 % intervals. "
         f"Left out: {len(outcomes) - len(seen)} runs in which what was drawn shows with d′ below {LEAST_VISIBLE:g} "
-        "(a clipping level that is never reached, a mode that is hardly rung).\n\n"
+        "(a clipping level that is never reached, a weakly excited mode).\n\n"
         + _overview(own)
         + _noise_levels(own)
         + _misses(own)
@@ -420,7 +290,7 @@ def write_report(outcomes: Sequence[Outcome], folder: str | Path) -> list[Path]:
             if size
         ]
         tally = Tally(singles)
-        confusion = [(outcome["effects"][0], tally.told(outcome)) for outcome in singles]
+        confusion = [(outcome["effects"][0], tally.words(outcome)) for outcome in singles]
         figures += [
             ("detection", "Right name against size", draw_detection(by_size, place / "figures/study_detection.png")),
             ("confusion", "Hidden against named", draw_confusion(confusion, place / "figures/study_confusion.png")),

@@ -1,1 +1,1 @@
-"""Worlds by the number: with a hidden effect, measured without a twin, or with errors inside tolerances."""
+"""Worlds by the number: with a hidden effect, of another generator, measured without a twin, or inside tolerances."""

@@ -22,8 +22,10 @@ from sim.motions.motion import SpinMotion, SplineSpin
 from sim.twin import Twin
 
 __all__ = [
+    "FORMLESS",
     "Measurement",
     "bias_instability",
+    "clipped_motion",
     "detectability",
     "discrete_parameters",
     "drawn_profile",
@@ -35,10 +37,14 @@ __all__ = [
     "temperature_course",
 ]
 
+FORMLESS = frozenset({"noise", "bias_random_walk", "coarse_resolution", "stuck_channel", "dropped_frames"})
+"""Effects without a noise-free form: no prediction shows them."""
+
 GRID, SMOOTHING = 5e-3, 0.08
 """Step of a drawn profile and standard deviation of the Gaussian that smooths it, s."""
 
 _POWERS = (0.25, 0.5, 2.0, 4.0)
+_CLIPPED_ABOVE, _FASTEST_SHARE = 1.07, 0.02  # of gravity; of the readings that have to be above it
 
 
 @dataclass(frozen=True)
@@ -80,6 +86,26 @@ def random_profile(rng: np.random.Generator, duration: float, *, top_rate: float
     """
     fine = profile_grid(duration)
     return SplineSpin.through(fine, gaussian_filter1d(drawn_profile(rng, fine, duration, top_rate), SMOOTHING / GRID))
+
+
+def clipped_motion(draw: Callable[[], SpinMotion], twin: Twin, setting: Measurement) -> SpinMotion:
+    """Draw motions until one has readings beyond gravity, often enough for clipping there to be seen.
+
+    Parameters
+    ----------
+    draw : callable
+        Draws a motion.
+    twin : Twin
+        The nominal world.
+    setting : Measurement
+        Length and rate.
+    """
+    t = np.arange(round(setting.duration * setting.sample_rate)) / setting.sample_rate
+    level = _CLIPPED_ABOVE * twin.gravity
+    while True:
+        motion = draw()
+        if np.quantile(np.abs(twin.predict(motion, t)[0]), 1.0 - _FASTEST_SHARE) > level:
+            return motion
 
 
 def profile_grid(duration: float) -> NDArray[np.float64]:

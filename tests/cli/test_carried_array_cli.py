@@ -11,7 +11,7 @@ import pytest
 from gfimu import AccelerometerArray, Recording
 from gfimu.errors import GfimuError
 from gfimu.recording.formats import open_run
-from sim.scenarios import simulate
+from sim.simulation import simulate
 
 SCENARIO = """
 array = "parts_box/own.toml"

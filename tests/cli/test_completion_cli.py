@@ -7,6 +7,7 @@ import re
 import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -14,7 +15,6 @@ from gfimu.cli.completion import effects, shown
 from gfimu.commands.catalogue import catalogue
 
 PROGRAM = [sys.executable, "-c", "from gfimu.cli import main; main()"]
-QUIET = {"_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION": "1"}
 
 
 @pytest.fixture
@@ -102,36 +102,81 @@ def test_zsh_and_fish_are_offered_values(gfimu_command, monkeypatch, shell, vari
         ("fish", ("complete --command",)),
     ],
 )
-def test_the_script_of_a_shell_is_printed(shell, words):
-    done = subprocess.run(
-        [*PROGRAM, "--show-completion", shell], env={**os.environ, **QUIET}, capture_output=True, text=True, check=True
-    )
+def test_the_script_of_a_named_shell_is_printed(shell, words):
+    done = subprocess.run([*PROGRAM, "--show-completion", shell], capture_output=True, text=True, check=True)
     assert all(word in done.stdout for word in words)
     if shutil.which(shell):
         subprocess.run([shell, "-n"], input=done.stdout, text=True, check=True)
 
 
-@pytest.mark.skipif(shutil.which("bash") is None, reason="no bash here")
-def test_bash_itself_completes(tmp_path):
-    program = tmp_path / "gfimu"
+@pytest.mark.parametrize("option", ["--install-completion", "--show-completion"])
+def test_a_shell_that_is_none_is_named(gfimu_command, option):
+    result = gfimu_command(option, "fsh")
+    assert result.code == 2
+    assert "unknown shell 'fsh'" in result.stderr
+    assert "did you mean 'fish'" in result.stderr
+
+
+@pytest.fixture
+def own_home(tmp_path):
+    """Return the environment of a user whose home is empty and whose shells find gfimu."""
+    program = tmp_path / "bin" / "gfimu"
+    program.parent.mkdir()
     program.write_text(f'#!/bin/sh\nexec {sys.executable} -c "from gfimu.cli import main; main()" "$@"\n')
     program.chmod(0o755)
-    environment = {**os.environ, **QUIET, "PATH": f"{tmp_path}:{os.environ['PATH']}"}
-    environment["PYTHONPATH"] = os.pathsep.join(path for path in sys.path if path)
+    paths = {"PATH": f"{program.parent}:{os.environ['PATH']}", "HOME": str(tmp_path)}
+    return {**os.environ, **paths, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
+
+
+@pytest.mark.parametrize(
+    ("shell", "file"),
+    [
+        ("bash", ".bash_completions/gfimu.sh"),
+        ("zsh", ".zfunc/_gfimu"),
+        ("fish", ".config/fish/completions/gfimu.fish"),
+    ],
+)
+def test_completion_is_installed_for_a_named_shell(own_home, project_root, shell, file):
+    done = subprocess.run(
+        ["gfimu", "--install-completion", shell], env=own_home, capture_output=True, text=True, check=True
+    )
+    assert f"{shell} completion installed in {own_home['HOME']}/{file}" in done.stdout
+    assert Path(own_home["HOME"], file).is_file()
+    page = (project_root / "docs" / "how_to" / "shell_completion.md").read_text(encoding="utf-8")
+    assert f"| `~/{file}` |" in page
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="no bash here")
+def test_bash_itself_completes(own_home):
     script = """
 source <(gfimu --show-completion bash)
 COMP_WORDS=(gfimu simulate pap) COMP_CWORD=2
 _gfimu_completion gfimu
 echo "${COMPREPLY[@]}"
 """
-    done = subprocess.run(["bash", "-c", script], env=environment, capture_output=True, text=True, check=True)
+    done = subprocess.run(["bash", "-c", script], env=own_home, capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "paper_run"
+
+
+@pytest.mark.skipif(shutil.which("fish") is None, reason="no fish here")
+@pytest.mark.parametrize(
+    ("line", "offered"),
+    [("gfimu simulate pap", "paper_run"), ("gfimu es", "estimate"), ("gfimu score my_", "my_array")],
+)
+def test_fish_itself_completes(own_home, tmp_path, line, offered):
+    (tmp_path / "my_array.toml").touch()
+    subprocess.run(["gfimu", "--install-completion", "fish"], env=own_home, capture_output=True, check=True)
+    done = subprocess.run(
+        ["fish", "-c", f"complete -C '{line}'"], env=own_home, cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert offered in done.stdout
 
 
 @pytest.mark.parametrize("line", ["gfimu design tacho", "gfimu es", "gfimu estimate run.csv --array cu"])
 def test_completion_waits_for_no_heavy_library(line):
     code = """
 import sys
+from pathlib import Path
 from gfimu.cli import main
 try:
     main()

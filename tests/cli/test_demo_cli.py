@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from gfimu.motion.estimation import Estimate
+from gfimu.motion.estimate import Estimate
 from gfimu.recording import Recording
 
 

@@ -13,7 +13,8 @@ from gfimu import AccelerometerArray, Recording
 from gfimu.files.model_files import find_model
 from sim.effects import make_effect
 from sim.motions.motion import SplineSpin
-from sim.scenarios import Scenario, simulate
+from sim.scenarios import Scenario
+from sim.simulation import simulate
 from sim.twin import Twin
 from sim.worlds.hidden import Measurement, measure, random_profile
 

@@ -12,6 +12,8 @@ import time
 
 import pytest
 
+from gfimu.cli.output import print_table
+
 pty = pytest.importorskip("pty")
 fcntl = pytest.importorskip("fcntl")
 termios = pytest.importorskip("termios")
@@ -105,6 +107,18 @@ def test_a_wide_table_on_a_narrow_terminal_breaks_no_number():
     assert code == 0
     text = re.sub(rb"\x1b\[[0-9;?]*[A-Za-z]", b"", shown).decode().replace("\r", "")
     assert "array: cube12\n  axes: 12\n  κ(J): 1.4142\n" in text
+
+
+def test_no_word_of_a_table_is_broken_where_another_column_can_wrap(capsys, monkeypatch):
+    """Seven columns for 80 characters: the words of the last one go to several lines, file name and rates to none."""
+    monkeypatch.setenv("COLUMNS", "80")
+    header = ("run", "length", "rate", "fastest", "acceleration", "turns", "forwards / backwards / rest")
+    row = ("clean.parquet", "59.99 s", "100 Hz", "12 rad/s", "25.8 rad/s²", "22", "51 / 32 / 16 %")
+    print_table("Recordings", header, [row])
+    shown = capsys.readouterr().out
+    assert max(map(len, shown.splitlines())) <= 80
+    for word in " ".join([*header, *row]).split():
+        assert word in shown, word
 
 
 @pytest.mark.parametrize("words", [("list", "effects"), ("--help",), ("show", "adxl355"), ("schema", "diagnose")])

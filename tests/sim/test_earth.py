@@ -9,7 +9,8 @@ from gfimu import AccelerometerArray, EarthRotation
 from gfimu.geometry.gravity import EARTH_RATE, local_gravity
 from sim.earth import earth_readings
 from sim.motions.motion import BodyState
-from sim.scenarios import Scenario, simulate
+from sim.scenarios import Scenario
+from sim.simulation import simulate
 
 LATITUDE = 35.7
 STILL = {

@@ -12,7 +12,8 @@ from gfimu.geometry.kinematics import specific_force
 from gfimu.recording import Recording
 from sim.effects import make_effect
 from sim.rigs.turntable import prescribed_readings
-from sim.scenarios import Scenario, simulate
+from sim.scenarios import Scenario
+from sim.simulation import simulate
 
 SHIPPED = ["driven_run", "eccentric_mount", "motor_run", "paper_run", "rest", "speed_sweep", "tumble"]
 PERFECT = "sensor.perfect=true"

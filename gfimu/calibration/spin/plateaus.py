@@ -12,7 +12,7 @@ from gfimu.calibration.spin.policy import SpinPolicy
 from gfimu.errors import InputError
 from gfimu.importing.guessing.likely_reference import reference_remedy
 from gfimu.recording import Recording
-from gfimu.recording.reference_times import reference_on_rows
+from gfimu.recording.timing.reference_times import reference_on_rows
 
 __all__ = ["Plateaus", "find_plateaus"]
 

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from gfimu.calibration.error_model import ErrorModel
 from gfimu.calibration.nonlinearity import cubic_std, quadratic_std
-from gfimu.calibration.result import Calibration, cubic_names, parameter_names, quadratic_names
+from gfimu.calibration.parameter_names import cubic_names, parameter_names, quadratic_names
+from gfimu.calibration.result import Calibration
 from gfimu.calibration.spin.policy import SpinPolicy
 from gfimu.errors import InputError, UnitError
 from gfimu.geometry.array import AccelerometerArray

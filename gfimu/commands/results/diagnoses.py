@@ -109,7 +109,7 @@ class Residual(Result, kw_only=True):
 
 
 class Gain(Result, kw_only=True):
-    """What the extension is worth on data that the fit never saw."""
+    """What the extension is worth on validation data."""
 
     held_out: Annotated[str, about("Which data these are; empty where none could be held out.")]
     held_out_rms_before: Annotated[Number, about("Prediction error before, rms.", "m/s²")]

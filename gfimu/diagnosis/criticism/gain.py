@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 __all__ = ["Gain"]
 
 
 @dataclass(frozen=True)
 class Gain:
-    """What the extension is worth on data that the fit never saw.
+    """What the extension is worth on validation data.
 
     Parameters
     ----------
@@ -48,3 +49,20 @@ class Gain:
     share_std: float = float("nan")
     share_in_any_recording: float = float("nan")
     of_other_recording: bool = False
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON form of the contract."""
+        return {
+            "held_out": self.held_out,
+            "held_out_rms_before": self.rms_before,
+            "held_out_rms_after": self.rms_after,
+            "share_of_excess_removed": self.share_of_excess_removed,
+            "share_of_excess_removed_std": self.share_std,
+            "share_in_any_recording": self.share_in_any_recording,
+            "log_likelihood_per_sample": self.log_likelihood_per_sample,
+            "log_likelihood_std": self.log_likelihood_std,
+            "rate_rmse_before_rad_s": self.rate_rmse_before,
+            "rate_rmse_after_rad_s": self.rate_rmse_after,
+            "position_drift_before_m": self.drift_before,
+            "position_drift_after_m": self.drift_after,
+        }

@@ -2,7 +2,7 @@
 
 Functions of the generic basis are taken in one by one, each where it makes the data most probable, with the drive and
 those before it projected out; then all are fitted with the full simulation and the noise is learnt from the residual.
-What a surrogate is worth is measured as for a cause: on data that its fit never saw.
+What a surrogate is worth is measured as for a cause: on validation data.
 """
 
 from __future__ import annotations

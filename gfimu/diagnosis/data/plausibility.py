@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import label
 
-from gfimu.diagnosis.data.integrity import SIGNIFICANT_RMS
-from gfimu.diagnosis.data.run import REFERENCE_COLUMNS, Run
+from gfimu.diagnosis.data.faults.wiring import SIGNIFICANT_RMS
+from gfimu.diagnosis.data.reference import REFERENCE_COLUMNS
+from gfimu.diagnosis.data.run import Run
 from gfimu.errors import InputError
 from gfimu.units import REFERENCE_UNITS, STANDARD_GRAVITY
 from gfimu.world_model import WorldModel, is_linear, reads_place

@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 from scipy.special import ndtr
 
-from gfimu.diagnosis.data.run import Run, difference_noise
+from gfimu.diagnosis.data.reference import difference_noise
+from gfimu.diagnosis.data.run import Run
 from gfimu.diagnosis.policy import Policy
 
-__all__ = ["channel_spikes", "frozen_stretches", "reference_spikes", "told_frozen"]
+__all__ = ["channel_spikes", "frozen_fault", "frozen_stretches", "reference_spikes"]
 
 _LONGEST_EQUAL = 40
 _LEAST_NOISE = 0.1  # of a step: with less no run is long enough to show it
@@ -91,7 +92,7 @@ def _least_equal(spread: float, quantum: float, readings: int) -> float:
     return max(float((np.log(Policy.chance) - np.log(readings)) / same), _LONGEST_EQUAL)
 
 
-def told_frozen(
+def frozen_fault(
     run: Run, frozen: Sequence[tuple[int, int, int]], names: Sequence[str]
 ) -> tuple[dict[str, object], str]:
     """Return the longest frozen stretch, with every channel that was frozen with it, and a sentence about all."""

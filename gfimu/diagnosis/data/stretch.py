@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
 from gfimu.diagnosis.data.cosine_basis import CosineBasis, NoiseLevels
+from gfimu.diagnosis.data.reference import difference_noise
 from gfimu.diagnosis.data.rounding import COARSE, NO_STEPS, Steps
-from gfimu.diagnosis.data.run import Run, difference_noise, smooth_rate
+from gfimu.diagnosis.data.run import Run, smooth_rate
 from gfimu.diagnosis.data.table.spins import JoinedSpin, ScaledSpin, State
 from gfimu.diagnosis.data.table.start_angle import gravity_angle
 from gfimu.world_model import Effect, Spin, WorldModel, is_linear, is_of_wiring, reads_place

@@ -95,7 +95,7 @@ def design(
         raise InputError(
             f"duration {limits.duration:g} s is too short to diagnose; allow at least {MINIMUM_DURATION} s"
         )
-    tell = report or _silent
+    progress = report or _silent
     allowed = _within_range(model, limits)
     bench = _Bench(model, effects, recorded, allowed, sample_rate)
     plain = plain_profile(allowed)
@@ -105,14 +105,14 @@ def design(
     points = starting_points(rng, _STARTS)
     tables = []
     for number, point in enumerate(points):
-        tell(0.1 * number / len(points), "first profiles")
+        progress(0.1 * number / len(points), "first profiles")
         tables.append(upright.table(profile_of(point, allowed)))
     ranked = [(_score(table), point) for table, point in zip(tables, points, strict=True)]
     inseparable = _never_parted(tables)
     words, plan, profile, after = "", upright, plain, before
     if not inseparable or not mountings:
         profile = improve(
-            ranked, upright.score, allowed, rng, evaluations, lambda share: tell(0.1 + 0.5 * share, "upright")
+            ranked, upright.score, allowed, rng, evaluations, lambda share: progress(0.1 + 0.5 * share, "upright")
         )
         after = upright.final(profile)
     if mountings and (inseparable or after.least_nats < SEPARATED):
@@ -126,7 +126,12 @@ def design(
         }
         name = max(tested, key=lambda name: max(value for value, _ in tested[name]))
         turned = improve(
-            tested[name], plans[name].score, allowed, rng, evaluations // 2, lambda share: tell(0.6 + 0.4 * share, name)
+            tested[name],
+            plans[name].score,
+            allowed,
+            rng,
+            evaluations // 2,
+            lambda share: progress(0.6 + 0.4 * share, name),
         )
         remounted = plans[name].final(turned)
         if remounted.least_nats > max(2.0 * after.least_nats, 1.0):

@@ -10,8 +10,9 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.diagnosis.design.table_profile import PEAK_OF_RAMP, Leg, TableProfile
+from gfimu.diagnosis.design.table_profile import Leg, TableProfile
 from gfimu.errors import InputError
+from gfimu.geometry.smooth_ramp import PEAK_OF_RAMP
 
 __all__ = ["Limits", "improve", "plain_profile", "profile_of", "starting_points"]
 

@@ -12,11 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import PPoly
 
 from gfimu.diagnosis.data.table.spins import State
+from gfimu.geometry.smooth_ramp import PEAK_OF_RAMP, smooth_ramp
 
-__all__ = ["PEAK_OF_RAMP", "Leg", "TableProfile"]
-
-PEAK_OF_RAMP = 1.875
-"""Largest acceleration of a quintic ramp over its mean: the slope of 10s³ − 15s⁴ + 6s⁵ at s = ½."""
+__all__ = ["Leg", "TableProfile"]
 
 
 @dataclass(frozen=True)
@@ -68,13 +66,9 @@ class TableProfile:
         # Legs of one second at the start rate and at the last rate, for what looks beyond the ends.
         pieces = [Leg(0.0, 1.0), *self.legs, Leg(self.legs[-1].to, 1.0)]
         breaks = np.cumsum([-1.0, *(leg.duration for leg in pieces)])
-        start, coefficients = 0.0, []
-        for leg in pieces:
-            step, length = leg.to - start, leg.duration
-            # start + step · (10s³ − 15s⁴ + 6s⁵), s = t/length
-            coefficients.append([6 * step / length**5, -15 * step / length**4, 10 * step / length**3, 0.0, 0.0, start])
-            start = leg.to
-        return PPoly(np.array(coefficients).T, breaks)
+        starts = [0.0, *(leg.to for leg in pieces[:-1])]
+        ramps = [smooth_ramp(start, leg.to, leg.duration) for start, leg in zip(starts, pieces, strict=True)]
+        return PPoly(np.column_stack(ramps), breaks)
 
     @cached_property
     def _angle(self) -> PPoly:

@@ -2,53 +2,40 @@
 
 from __future__ import annotations
 
-import base64
-import io
-import re
-import zlib
-
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_svg import FigureCanvasSVG
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import SymLogNorm
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
-from PIL import Image
 from scipy.ndimage import uniform_filter1d
 
-from gfimu.diagnosis.criticism.views.dependence import Dependence, Fingerprint
+from gfimu.diagnosis.criticism.views.dependence import Dependence
 from gfimu.diagnosis.criticism.views.residual_spectrum import ResidualSpectrum
 from gfimu.diagnosis.criticism.views.residuals import ResidualSize, Whiteness
 from gfimu.diagnosis.criticism.views.rigid_motion import BandPower
 from gfimu.diagnosis.criticism.views.run_view import RunView
-from gfimu.diagnosis.policy import Policy
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.geometry.turning_axis import TurningAxis
 from gfimu.visual.colours import (
     AFTER_ON_PAPER,
     BEFORE_ON_PAPER,
-    DIVERGING,
     INK,
     NOISE_ON_PAPER,
-    PAGE,
     PALE,
     chip_colour,
     css,
 )
 from gfimu.visual.page import PlotLimits
+from gfimu.visual.page.svg import ON_PAGE, svg_text
 from gfimu.visual.rig.figure import array_figure, channel_style
+from gfimu.visual.rig.words import short_name
 
 __all__ = [
-    "bars_figure",
     "channels_figure",
     "dependence_figure",
-    "fingerprint_figure",
-    "rig_figure",
+    "rig_figures",
     "rigid_figure",
     "spectrum_figure",
-    "themed",
     "trace_figure",
     "whiteness_figure",
 ]
@@ -59,28 +46,13 @@ _LIMITS = PlotLimits()
 _MANY = 24  # channels, of more of which pictures are coarser so that the page stays small
 _MOST_POINTS = 4000
 _MOST_FREQUENCIES = 1200
-_DPI, _COARSE_DPI = 110, 55
-_GRID = "#ededed"  # of `array_figure`
-_STYLE = {
-    "font.family": "sans-serif",
-    "font.size": 10,
-    "svg.fonttype": "none",
-    "svg.hashsalt": "gfimu",
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.edgecolor": _NOISE,
-    "axes.labelcolor": _INK,
-    "text.color": _INK,
-    "xtick.color": _INK,
-    "ytick.color": _INK,
-    "legend.frameon": False,
-    "axes.grid": False,  # whatever style the caller has set
-}
+_COARSE_DPI = 55
+_VIEW = (4.4, 2.4)  # inches: letters are legible where a view is as narrow as a telephone
 
 
 def trace_figure(run: RunView, size: ResidualSize) -> str:
     """Draw the residual of the channel that was worst, before and after."""
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(ON_PAGE):
         figure = Figure(figsize=(11.0, 3.0), layout="constrained")
         axis = figure.subplots()
         excess = np.nan_to_num(size.before / size.floor, nan=-1.0, posinf=0.0)
@@ -90,15 +62,7 @@ def trace_figure(run: RunView, size: ResidualSize) -> str:
         axis.set_ylabel("m/s²")
         axis.set_xlabel("time, s")
         _legend_above(axis)
-        return _svg(figure)
-
-
-def bars_figure(size: ResidualSize) -> str:
-    """Draw the rms of the residual of every channel, before and after, beside its noise."""
-    with mpl.rc_context(_STYLE):
-        figure = Figure(figsize=(11.0, 2.3), layout="constrained")
-        _bars(figure.subplots(), size)
-        return _svg(figure)
+        return svg_text(figure)
 
 
 def channels_figure(run: RunView, size: ResidualSize, array: AccelerometerArray) -> str:
@@ -106,7 +70,7 @@ def channels_figure(run: RunView, size: ResidualSize, array: AccelerometerArray)
     count = len(size.channels)
     columns = 3 if count % 3 == 0 else 4
     rows = -(-count // columns)
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(ON_PAGE):
         figure = Figure(figsize=(11.0, 1.35 * rows + 0.4), layout="constrained")
         axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
         for channel, axis in enumerate(axes.flat):
@@ -115,27 +79,35 @@ def channels_figure(run: RunView, size: ResidualSize, array: AccelerometerArray)
                 continue
             _trace(axis, run, channel, size.floor[channel])
             axis.set_title(
-                size.channels[channel], loc="left", fontsize=9, pad=2, color=channel_style(array, channel)[0]
+                short_name(size.channels[channel]),
+                loc="left",
+                fontsize=9,
+                pad=2,
+                color=channel_style(array, channel)[0],
             )
         for axis in axes[:, 0]:
             axis.set_ylabel("m/s²")
         for axis in axes[-1]:
             axis.set_xlabel("time, s")
-        return _svg(figure, _DPI if count <= _MANY else _COARSE_DPI)
+        return svg_text(figure, _COARSE_DPI if count > _MANY else None)
 
 
-def rig_figure(
+def rig_figures(
     array: AccelerometerArray, axis: TurningAxis | None, gravity: NDArray[np.float64] | None, gravity_name: str
-) -> str:
-    """Draw the array with its chips, sensing axes, gravity and axis of rotation; see `array_figure`."""
-    with mpl.rc_context(_STYLE):
-        return _svg(array_figure(array, axis=axis, gravity=gravity, gravity_name=gravity_name))
+) -> tuple[str, str]:
+    """Draw the array with its chips, sensing axes, gravity and axis of rotation, from the side and from above."""
+    with mpl.rc_context(ON_PAGE):
+        side, above = (
+            svg_text(array_figure(array, axis=axis, gravity=gravity, gravity_name=gravity_name, views=(view,)))
+            for view in ("side", "above")
+        )
+    return side, above
 
 
 def dependence_figure(dependence: Dependence, array: AccelerometerArray) -> str:
     """Draw the mean residual over one quantity, before and after, the four strongest channels in colour."""
-    with mpl.rc_context(_STYLE):
-        figure = Figure(figsize=(5.4, 2.3), layout="constrained")
+    with mpl.rc_context(ON_PAGE):
+        figure = Figure(figsize=_VIEW, layout="constrained")
         pair = figure.subplots(1, 2, sharey=True)
         strongest = list(np.argsort(-dependence.amplitude_before)[: _LIMITS.coloured])
         many = array.n_channels > _MANY
@@ -154,19 +126,22 @@ def dependence_figure(dependence: Dependence, array: AccelerometerArray) -> str:
                     color=colour,
                     linestyle=line,
                     linewidth=1.3,
-                    label=array.channels[channel],
+                    label=short_name(array.channels[channel]),
                 )
             axis.set_title(title, loc="left", fontsize=9.5, pad=3)
             axis.set_xlabel(f"{dependence.symbol}, {dependence.unit}")
         pair[0].set_ylabel("mean residual, m/s²")
-        pair[1].legend(fontsize=8, loc="upper right", handlelength=1.0, labelspacing=0.2)
-        return _svg(figure)
+        figure.legend(
+            *pair[1].get_legend_handles_labels(), loc="outside lower center", ncols=len(strongest), fontsize=8,
+            handlelength=1.6, columnspacing=1.0,
+        )  # fmt: skip
+        return svg_text(figure)
 
 
 def spectrum_figure(spectrum: ResidualSpectrum) -> str:
     """Draw a spectrum before and after against noise."""
-    with mpl.rc_context(_STYLE):
-        figure = Figure(figsize=(5.4, 2.5), layout="constrained")
+    with mpl.rc_context(ON_PAGE):
+        figure = Figure(figsize=_VIEW, layout="constrained")
         axis = figure.subplots()
         group = max(1, len(spectrum.at) // _MOST_FREQUENCIES)
         starts = np.arange(0, len(spectrum.at), group)
@@ -182,13 +157,13 @@ def spectrum_figure(spectrum: ResidualSpectrum) -> str:
         axis.set_xlabel("frequency, Hz" if spectrum.unit == "Hz" else spectrum.unit)
         axis.set_ylabel(spectrum.quantity)
         _legend_above(axis)
-        return _svg(figure)
+        return svg_text(figure)
 
 
 def rigid_figure(power: BandPower) -> str:
     """Draw the power of the given simulation's residual in single chips, the whole array and a spin, over frequency."""
-    with mpl.rc_context(_STYLE):
-        figure = Figure(figsize=(5.4, 2.5), layout="constrained")
+    with mpl.rc_context(ON_PAGE):
+        figure = Figure(figsize=_VIEW, layout="constrained")
         axis = figure.subplots()
         axis.axhline(1.0, color=_NOISE, linestyle="--", label="noise")
         parts = ((power.spin, "spin"), (power.array, "whole array"), (power.chips, "single chips"))
@@ -202,13 +177,13 @@ def rigid_figure(power: BandPower) -> str:
         axis.set_xlabel("frequency, Hz")
         axis.set_ylabel("power over that of noise")
         _legend_above(axis)
-        return _svg(figure)
+        return svg_text(figure)
 
 
 def whiteness_figure(whiteness: Whiteness) -> str:
     """Draw the cumulative periodogram of every channel: noise gives the diagonal."""
-    with mpl.rc_context(_STYLE):
-        figure = Figure(figsize=(5.4, 2.5), layout="constrained")
+    with mpl.rc_context(ON_PAGE):
+        figure = Figure(figsize=_VIEW, layout="constrained")
         pair = figure.subplots(1, 2, sharey=True)
         frequency = whiteness.frequency
         step = max(1, len(frequency) // 400)
@@ -224,32 +199,7 @@ def whiteness_figure(whiteness: Whiteness) -> str:
             axis.set_xlabel("frequency, Hz")
             axis.set_ylim(0, 1)
         pair[0].set_ylabel("share of the power below")
-        return _svg(figure)
-
-
-def fingerprint_figure(fingerprint: Fingerprint) -> str:
-    """Draw how strongly each channel follows each basic term, before and after, in standard deviations of chance."""
-    count, terms = fingerprint.before.shape
-    largest = max(10.0, float(np.abs(fingerprint.before).max()), float(np.abs(fingerprint.after).max()))
-    with mpl.rc_context(_STYLE):
-        figure = Figure(figsize=(11.0, 0.24 * count + 1.2), layout="constrained")
-        pair = figure.subplots(1, 2, sharey=True)
-        norm = SymLogNorm(linthresh=Policy.noise_stds, vmin=-largest, vmax=largest)
-        for axis, values, title in zip(pair, (fingerprint.before, fingerprint.after), ("before", "after"), strict=True):
-            shown = np.ma.masked_where(np.abs(values) < Policy.noise_stds, values)  # the page shows through
-            axis.imshow(shown, cmap=DIVERGING, norm=norm, aspect="auto", interpolation="nearest")
-            axis.set_xticks(range(terms), fingerprint.terms, rotation=40, ha="right")
-            axis.set_yticks(range(count), fingerprint.channels)
-            axis.set_title(title, loc="left", fontsize=10)
-            axis.tick_params(length=0)
-        bar = figure.colorbar(ScalarMappable(norm, DIVERGING), ax=pair.tolist(), shrink=0.9, pad=0.01)
-        ticks = [tick for tick in (3, 10, 30, 100, 1000, 10_000) if tick <= largest]
-        bar.set_ticks(
-            [-tick for tick in ticks[::-1]] + ticks,
-            labels=[f"−{tick}" for tick in ticks[::-1]] + [f"{t}" for t in ticks],
-        )
-        bar.set_label("standard deviations")
-        return _svg(figure)
+        return svg_text(figure)
 
 
 def _trace(axis: Axes, run: RunView, channel: int, floor: float) -> None:
@@ -287,72 +237,9 @@ def _thinned(t: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[NDArr
     return np.repeat(t[:whole:group], 2), ends
 
 
-def _bars(axis: Axes, size: ResidualSize) -> None:
-    place = np.arange(len(size.channels))
-    axis.bar(place - 0.2, size.before, 0.4, color=_BEFORE, label="before")
-    axis.bar(place + 0.2, size.after, 0.4, color=_AFTER, label="after")
-    axis.hlines(size.floor, place - 0.45, place + 0.45, color=_INK, linewidth=1.2, label="noise")
-    if np.nanmax(size.before) > 20 * np.nanmin(size.floor):
-        axis.set_yscale("log")
-    step = -(-len(place) // 24)  # of more bars than 24, every second, third … has its name
-    axis.set_xticks(place[::step], size.channels[::step], rotation=60 if len(place) > 8 else 0, fontsize=8.5)
-    axis.set_ylabel("m/s²")
-    axis.set_title("rms per channel", loc="left", fontsize=10.5)
-    axis.margins(x=0.01)
-    _legend_above(axis)
-
-
 def _legend_above(axis: Axes) -> None:
     legend = axis.legend(
         loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, fontsize=8.5, handlelength=1.2, borderpad=0
     )
     for line in legend.get_lines():
         line.set_linewidth(2.0)
-
-
-def _svg(figure: Figure, dpi: int = _DPI) -> str:
-    buffer = io.StringIO()
-    if layout := figure.get_layout_engine():  # laid out here, as a figure that is saved with a layout is drawn twice
-        FigureCanvasSVG(figure)
-        figure.set_dpi(72)  # points per inch, in which SVG is laid out
-        layout.execute(figure)
-        figure.set_layout_engine(None)
-    figure.savefig(buffer, format="svg", dpi=dpi, metadata={"Date": None})
-    text = buffer.getvalue()
-    text = text[text.index("<svg") :]
-    text = re.sub(r"<metadata>.*?</metadata>", "", text, count=1, flags=re.DOTALL)
-    text = re.sub(r'(<image\b[^>]*?) id="[^"]*"', r"\1", text)  # equal pictures would share one name
-    text = re.sub(r"(?<=base64,)[^\"]+", lambda match: _few_colours(match.group()), text)
-    text = _shortened(text)
-    # Several figures share one page: their definitions must not share names; the size follows the page.
-    tag = f"f{zlib.crc32(text.encode()):08x}"
-    text = re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{tag}_", text)
-    return re.sub(r"<svg [^>]*>", lambda match: re.sub(r' (width|height)="[^"]*"', "", match.group(0)), text, count=1)
-
-
-def _shortened(svg: str) -> str:
-    """Return a figure without comments, without names that nothing refers to, and with two decimals of a point."""
-    svg = re.sub(r"<!--.*?-->", "", svg, flags=re.DOTALL)
-    used = set(re.findall(r'(?:url\(|href=")#([^)"]+)', svg))
-    svg = re.sub(r' id="([^"]+)"', lambda match: match[0] if match[1] in used else "", svg)
-    svg = re.sub(r"<defs>\s*<style[^>]*>.*?</style>\s*</defs>", "", svg, flags=re.DOTALL)
-    svg = re.sub(r"(?<=[ \"(,-])\d+\.\d{3,}", lambda match: f"{float(match[0]):.2f}".rstrip("0").rstrip("."), svg)
-    return re.sub(r"\s*\n\s*", " ", svg)
-
-
-def _few_colours(picture: str) -> str:
-    """Return a PNG picture in base64 with at most 64 colours, which is a third as long."""
-    image = Image.open(io.BytesIO(base64.b64decode(picture))).convert("RGBA")
-    buffer = io.BytesIO()
-    image.quantize(64, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE).save(buffer, "png", optimize=True)
-    return base64.b64encode(buffer.getvalue()).decode("ascii")
-
-
-def themed(svg: str, chips: int) -> str:
-    """Return a figure whose colours are those of the page, by day and by night, in place of fixed ones."""
-    names = {
-        css(PAGE["light"][name]): name for name in ("card", "ink", "noise", "band", "before", "after", "spin-axis")
-    }
-    names[_GRID] = "line"
-    names |= {css(chip_colour(number, on_paper=True)): f"chip-{number}" for number in range(chips)}
-    return re.sub(r"#[0-9a-f]{6}\b", lambda match: f"var(--{names[match[0]]})" if match[0] in names else match[0], svg)

@@ -15,6 +15,7 @@ from gfimu.diagnosis.criticism.views.residuals import ResidualViews, residual_vi
 from gfimu.diagnosis.criticism.views.rigid_motion import RigidMotion
 from gfimu.diagnosis.criticism.views.run_view import RunView
 from gfimu.diagnosis.report import figures
+from gfimu.diagnosis.report.channel_tables import channel_bars, fingerprint_rows
 from gfimu.diagnosis.report.plain_words import (
     gain_rows,
     headline,
@@ -26,15 +27,17 @@ from gfimu.diagnosis.report.plain_words import (
     percent,
     story,
     summary,
+    three_digits,
 )
 from gfimu.diagnosis.report.rig import DrawnRig
 from gfimu.diagnosis.report.zooming import dependence_plot, residual_plot, spectrum_plot
-from gfimu.diagnosis.verdict.verdict import Diagnosis, NamedCause
+from gfimu.diagnosis.verdict.parts import NamedCause
+from gfimu.diagnosis.verdict.verdict import Diagnosis
 from gfimu.diagnosis.verdict.wording import SAME_SHARE
 from gfimu.files.atomic_file import write_text
 from gfimu.geometry.array import AccelerometerArray
-from gfimu.visual.colours import PAGE, chip_colour, css
-from gfimu.visual.page import Packed, page_plots
+from gfimu.visual.page import Packed, page_plots, page_style
+from gfimu.visual.page.svg import themed
 from gfimu.visual.rig import package_of
 from gfimu.visual.rig.words import package_words, scene_title
 
@@ -55,6 +58,11 @@ _VIEWS = (
     ("temperature", "over the board's temperature"),
     ("reading", "over the reading itself"),
 )
+_NO_SHARE = "No sizeable share of the residual follows it beyond chance"
+_NO_LINE = "No line stands out beyond chance"
+_NO_PLACE = "No single chip, array or rotation stands out beyond chance"
+_NOISE = "It is: neighbouring samples agree no more than by chance"
+"""What is written of a view that shows nothing."""
 _MOST_PARAMETERS = 14
 _FIRST_PARAMETERS = 4  # beside the headline
 
@@ -99,7 +107,7 @@ def _content(diagnosis: Diagnosis, rig: DrawnRig) -> Mapping[str, Any]:
         "version": __version__,
         "label": label,
         "tone": tone,
-        "themes": _themes(len(array.chips)),
+        "style": page_style(len(array.chips)),
         "plots": page_plots({"plots": plots}, data),
         "plot_rule": _plot_rule(plots["residual"]["grouped"]) if seen else "",
         "array": _array(diagnosis, rig),
@@ -118,26 +126,18 @@ def _content(diagnosis: Diagnosis, rig: DrawnRig) -> Mapping[str, Any]:
         "any_share": _share_in_any_recording(diagnosis),
         "steps": next_steps(diagnosis),
         "noise": diagnosis.noise,
-        "noise_texts": noise_texts(diagnosis.noise),
+        "noise_texts": noise_texts(diagnosis.noise, linear=any(run.linear for run in seen)),
         "linear": any(run.linear for run in seen),
         "runs": [_run(run, views, array) for run, views in zip(seen, found, strict=True)],
         "views": shown,
         "channels_picture": _picture(figures.channels_figure(seen[0], found[0].size, array), array) if found else "",
-        "fingerprint": _picture(figures.fingerprint_figure(found[0].fingerprint), array) if found else "",
-    }
-
-
-def _themes(chips: int) -> Mapping[str, Mapping[str, str]]:
-    """Return the colours of the page by day and by night, with one for each chip."""
-    return {
-        theme: {name: css(colour) for name, colour in colours.items()}
-        | {f"chip-{number}": css(chip_colour(number, on_paper=theme == "light")) for number in range(chips)}
-        for theme, colours in PAGE.items()
+        "terms": found[0].fingerprint.terms if found else (),
+        "fingerprint": fingerprint_rows(found[0].fingerprint) if found else (),
     }
 
 
 def _picture(svg: str, array: AccelerometerArray) -> str:
-    return figures.themed(svg, len(array.chips))
+    return themed(svg, len(array.chips))
 
 
 def _plot_rule(grouped: int) -> str:
@@ -157,10 +157,11 @@ def _run(run: RunView, views: ResidualViews, array: AccelerometerArray) -> Mappi
         "lost": int((~run.valid.any(axis=1)).sum()),
         "dead": [name for name, good in zip(array.channels, alive, strict=True) if not good],
         "trace": _picture(figures.trace_figure(run, size), array),
-        "bars": _picture(figures.bars_figure(size), array),
+        "bars": channel_bars(size, array),
         "summary": (
-            f"Residual of {size.channels[worst]}, the channel furthest above its noise: rms {size.before[worst]:.3g} "
-            f"m/s² before, {size.after[worst]:.3g} m/s² after; its noise is {size.floor[worst]:.3g} m/s²."
+            f"Residual of {size.channels[worst]}, the channel furthest above its noise: rms "
+            f"{three_digits(size.before[worst])} m/s² before, {three_digits(size.after[worst])} m/s² after; its noise "
+            f"is {three_digits(size.floor[worst])} m/s²."
         ),
         "sentences": views.sentences,
     }
@@ -174,12 +175,12 @@ def _array(diagnosis: Diagnosis, rig: DrawnRig) -> dict[str, Any]:
         "title": scene_title(array),
         "package": package_words(package_of(array)),
         "description": array.description,
-        "picture": _picture(figures.rig_figure(array, axis, gravity, name), array),
+        "pictures": [_picture(svg, array) for svg in figures.rig_figures(array, axis, gravity, name)],
         "chips": [
             {
                 "name": chip.name,
                 "channels": ", ".join(chip.channels),
-                "place": ", ".join(f"{1000.0 * part + 0.0:.4g}" for part in chip.position),
+                "place": ", ".join(f"{1000.0 * part + 0.0:.4g}" for part in chip.position).replace("-", "−"),
                 "part": chip.part,
             }
             for chip in array.chips
@@ -208,12 +209,12 @@ def _share_in_any_recording(diagnosis: Diagnosis) -> str:
 def _figures_of_merit(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
     """Return the numbers of the first screen: value, unit, what it is."""
     residual, gain = diagnosis.residual, diagnosis.gain
-    merits = [(f"{residual.rms_before:.3g}", "m/s²", "prediction error, simulation as given")]
+    merits = [(three_digits(residual.rms_before), "m/s²", "prediction error, simulation as given")]
     if diagnosis.causes or diagnosis.unexplained.extends_twin:
-        merits.append((f"{residual.rms_after:.3g}", "m/s²", "prediction error, extended"))
-    merits.append((f"{residual.noise_floor:.3g}", "m/s²", "the sensors' own noise"))
+        merits.append((three_digits(residual.rms_after), "m/s²", "prediction error, extended"))
+    merits.append((three_digits(residual.noise_floor), "m/s²", "the sensors' own noise"))
     if np.isfinite(gain.share_of_excess_removed):
-        merits.append((percent(gain.share_of_excess_removed), "", "of the error gone on unseen data"))
+        merits.append((percent(gain.share_of_excess_removed), "", "of the error gone on validation data"))
     if diagnosis.verdict == "explained" and diagnosis.causes:
         merits.append((percent(min(cause.probability for cause in diagnosis.causes)), "", "probability"))
     return merits
@@ -242,11 +243,11 @@ def _views(diagnosis: Diagnosis, views: ResidualViews, plots: dict[str, Any], da
     array = diagnosis.twin.array
     shown: list[Mapping[str, Any]] = []
 
-    def show(title: str, view: Any, picture: str, caption: str, plot: dict[str, Any] | None = None) -> None:
+    def show(title: str, view: Any, picture: str, caption: str, calm: str, plot: dict[str, Any] | None = None) -> None:
         name = "" if plot is None else title.replace(" ", "-").replace("'", "")
         if plot is not None:
             plots[name] = plot
-        words = {"title": title, "sentence": view.sentence, "looks": view.looks, "caption": caption}
+        words = {"title": title, "sentence": view.sentence, "looks": view.looks, "caption": caption, "calm": calm}
         shown.append({**words, "picture": _picture(picture, array), "plot": name})
 
     for name, title in _VIEWS:
@@ -254,17 +255,17 @@ def _views(diagnosis: Diagnosis, views: ResidualViews, plots: dict[str, Any], da
             strongest = array.channels[int(np.argmax(np.nan_to_num(dependence.amplitude_before)))]
             caption = f"Mean residual over {dependence.quantity}; {strongest} follows it most."
             plot = dependence_plot(dependence, array, data)
-            show(title, dependence, figures.dependence_figure(dependence, array), caption, plot)
+            show(title, dependence, figures.dependence_figure(dependence, array), caption, _NO_SHARE, plot)
     for spectrum, title in ((views.spectrum, "over frequency"), (views.orders, "over cycles per revolution")):
         if spectrum is not None:
             caption = "Rms over the channels beside that of noise; drawn at its peaks."
-            show(title, spectrum, figures.spectrum_figure(spectrum), caption, spectrum_plot(spectrum, data))
+            show(title, spectrum, figures.spectrum_figure(spectrum), caption, _NO_LINE, spectrum_plot(spectrum, data))
     if diagnosis.rigid is not None and diagnosis.rigid.combinations:
         rigid = _RigidView(_place(diagnosis.rigid), len(diagnosis.rigid.excesses))
         caption = "Power over that of noise, of the given simulation's residual, by what moves together."
-        show("whose motion is it?", rigid, figures.rigid_figure(diagnosis.rigid.power), caption)
+        show("whose motion is it?", rigid, figures.rigid_figure(diagnosis.rigid.power), caption, _NO_PLACE)
     caption = "Cumulative periodogram of each channel; that of noise stays in the band."
-    show("is it noise?", views.whiteness, figures.whiteness_figure(views.whiteness), caption)
+    show("is it noise?", views.whiteness, figures.whiteness_figure(views.whiteness), caption, _NOISE)
     return shown
 
 

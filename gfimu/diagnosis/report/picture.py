@@ -48,6 +48,8 @@ def write_picture(
     readings = np.where(view.valid, view.measured, np.nan)
     recording = Recording.from_arrays(view.t, readings, array)
     stood = rig or DrawnRig()
+    if stood.lean is not None and array.turning_axis is None:
+        array = replace(array, turning_axis=stood.axis)  # drawn with its arm, in place of a table
     write_comparison(
         path,
         recording,
@@ -85,11 +87,8 @@ def _motion(view: RunView, stood: DrawnRig) -> KnownMotion | None:
     if stood.slide is not None:
         still = np.tile(Rotation.from_rotvec(mounting).as_quat(scalar_first=True), (len(view.t), 1))
         return KnownMotion("drive, estimated", view.t, still, centre + np.outer(view.angle, stood.slide))
-    table = Rotation.from_rotvec(np.outer(view.angle, [0.0, 0.0, 1.0]))
-    attitude = table * Rotation.from_rotvec(mounting)
-    return KnownMotion(
-        "drive, estimated", view.t, attitude.as_quat(scalar_first=True), table.apply(centre), angle=view.angle
-    )
+    attitude = stood.attitude(view.angle).as_quat(scalar_first=True)
+    return KnownMotion("drive, estimated", view.t, attitude, stood.places(view.angle), angle=view.angle)
 
 
 def _plots(view: RunView) -> list[Plot]:

@@ -10,7 +10,8 @@ import numpy as np
 
 from gfimu.diagnosis.criticism.views.run_view import RunView
 from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.verdict.verdict import Diagnosis, NamedCause
+from gfimu.diagnosis.verdict.parts import NamedCause
+from gfimu.diagnosis.verdict.verdict import Diagnosis
 from gfimu.units import NAME, NUMBER, RATIO, STANDARD_GRAVITY, key_name
 
 __all__ = [
@@ -25,17 +26,24 @@ __all__ = [
     "percent",
     "story",
     "summary",
+    "three_digits",
 ]
 
 _OF_A_CALIBRATION = frozenset({"bias", "scale_factor", "misalignment", "cross_axis"})
 _THOUSANDTHS = ("rad", "m", "s")
-_NOISE_UNITS = {
-    "bias_instability_m_s2": "m/s²",
-    "bias_instability_largest_m_s2": "m/s²",
-    "time_jitter_s": "s",
-    "disagreement_s": "s",
-    "gyro_bias_rad_s": "rad/s",
-}  # of `Diagnosis.noise`; a level without one is a plain number or a name
+_NOISE_LEVELS = {
+    "white_over_data_sheet": ("white noise of the channels over that of the data sheet (median)", ""),
+    "bias_instability_m_s2": ("bias instability (median of the channels)", "m/s²"),
+    "bias_instability_largest_m_s2": ("largest bias instability", "m/s²"),
+    "bias_instability_largest_channel": ("channel of the largest bias instability:", ""),
+    "reference_white": ("white noise of the reference", "rad/s"),
+    "time_jitter_s": ("jitter of the sample times", "s"),
+    "disagreement_s": ("disagreement of the channels over the rate of change of their readings", "s"),
+    "gyro_bias_rad_s": ("bias of the gyro", "rad/s"),
+    "impossible_values": ("values that can't be a measurement", ""),
+    "calibration_residue": ("size of the small corrections (calibration residue)", ""),
+}
+"""Words and unit of each level in `Diagnosis.noise`."""
 _SMALL = 0.1
 _MOST_DECIMALS = 5
 _MOST_DIGITS = 100
@@ -118,15 +126,16 @@ def story(diagnosis: Diagnosis) -> str:
     before, after, floor = residual.rms_before, residual.rms_after, residual.noise_floor
     text = (
         f"A simulation of the rig predicted what its {count} accelerometer channels should have read. "
-        f"It misses the measurement by {before:.3g} m/s² rms; the sensors' own noise is {floor:.3g} m/s². "
+        f"It misses the measurement by {three_digits(before)} m/s² rms; the sensors' own noise is "
+        f"{three_digits(floor)} m/s². "
     )
     silent = sorted({channel for run in diagnosis.runs for channel in _silent(diagnosis, run)})
     if silent:
         text += f"Left out for want of a usable sample: {_joined(silent)}. "
     if diagnosis.verdict == "nothing_found" and diagnosis.calibration_residue:
         return text + (
-            f"With small corrections of every bias, gain, axis and position it misses by {after:.3g} m/s²; no single "
-            "cause predicts the data better."
+            f"With small corrections of every bias, gain, axis and position it misses by {three_digits(after)} m/s²; "
+            "no single cause predicts the data better."
         )
     if diagnosis.verdict == "nothing_found":
         return text + "No cause in the library, and no pattern of any other kind, predicts the data better than chance."
@@ -146,10 +155,10 @@ def _put_in(diagnosis: Diagnosis) -> str:
     if diagnosis.causes:
         what = "this" if len(diagnosis.causes) == 1 else "these"
         what = "either of these" if diagnosis.verdict == "ambiguous" else what
-        text += f"With {what} put into the simulation it misses by {after:.3g} m/s²"
+        text += f"With {what} put into the simulation it misses by {three_digits(after)} m/s²"
         text += ", which is noise. " if after < 1.05 * diagnosis.residual.noise_floor else ". "
     if diagnosis.unexplained.extends_twin:
-        text += f"With a description that has no name in the simulation it misses by {after:.3g} m/s². "
+        text += f"With a description that has no name in the simulation it misses by {three_digits(after)} m/s². "
     return text
 
 
@@ -159,7 +168,7 @@ def _on_unseen_data(diagnosis: Diagnosis) -> str:
     if not math.isfinite(gain.share_of_excess_removed):
         return ""
     text = (
-        f"On data that the fit never saw ({gain.held_out}), {percent(gain.share_of_excess_removed)} of the error "
+        f"On validation data ({gain.held_out}), {percent(gain.share_of_excess_removed)} of the error "
         "beyond noise is gone. "
     )
     if diagnosis.unexplained.left_out and math.isfinite(gain.share_in_any_recording):
@@ -223,13 +232,18 @@ def parameter_texts(cause: NamedCause, units: Mapping[str, str]) -> list[Paramet
     return texts
 
 
-def noise_texts(noise: Mapping[str, float | str]) -> list[str]:
-    """Return the noise levels of a diagnosis as people read them: name, value and unit."""
+def noise_texts(noise: Mapping[str, float | str], *, linear: bool = False) -> list[str]:
+    """Return the noise levels of a diagnosis as people read them: name, value and unit.
+
+    ``linear``: the reference is that of a carriage. A level of zero was not found and is left out.
+    """
     texts = []
     for key, value in noise.items():
-        unit = _NOISE_UNITS.get(key, "")
-        name = key_name(key, unit).replace("_", " ")
-        texts.append(f"{name} {value if isinstance(value, str) else _number(value, unit).strip()}")
+        words, unit = _NOISE_LEVELS.get(key, (key.replace("_", " "), ""))
+        if value == 0:
+            continue
+        unit = unit.replace("rad/s", "m/s") if linear else unit
+        texts.append(f"{words} {value if isinstance(value, str) else _number(value, unit).strip()}")
     return texts
 
 
@@ -250,7 +264,7 @@ def next_steps(diagnosis: Diagnosis) -> list[str]:
     if diagnosis.verdict == "explained":
         steps += [_to_be_sure(cause) for cause in diagnosis.causes if cause.not_distinguishable_from]
     if not diagnosis.gain.held_out and diagnosis.verdict != "nothing_found":
-        steps.append("Record a second run: with --held-out its gain is measured on data that the fit never saw.")
+        steps.append("Record a second run: with --held-out its gain is measured on validation data.")
     return [step.strip() for step in steps]
 
 
@@ -313,6 +327,13 @@ def percent(share: float) -> str:
     return f"{100 * share:.3g} %"
 
 
+def three_digits(value: float) -> str:
+    """Return a number with three significant digits, zeros at its end too: ``"0.0340"``; a dash if it is none."""
+    if not math.isfinite(value):
+        return "–"
+    return f"{value:#.3g}".removesuffix(".").replace("-", "−") if value else "0"
+
+
 def odds(log_odds: float) -> str:
     """Return log odds against the verdict as people say them: ``"1 : 20"``, ``"1 : 10⁵²"``."""
     if not math.isfinite(log_odds):
@@ -359,7 +380,7 @@ def _familiar(value: float, std: float | None, unit: str) -> str:
 
 
 def _number(value: float, unit: str) -> str:
-    return f"{value:.3g} {unit}" if math.isfinite(value) else ""
+    return f"{three_digits(value)} {unit}" if math.isfinite(value) else ""
 
 
 def _count(number: int) -> str:

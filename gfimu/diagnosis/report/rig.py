@@ -34,19 +34,22 @@ class DrawnRig:
         Shapes of ``base``, ``table`` and ``cube`` of the extended rig; a plain rig sized from the array otherwise.
     slide : ndarray, shape (3,), optional
         Direction in which a carriage moves, in place of a table that turns.
+    lean : ndarray, shape (3,), optional
+        Rotation vector from the world to the frame of an axis that is not a table's but a pendulum's, rad.
     """
 
     mounting: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
     centre: NDArray[np.float64] = field(default_factory=lambda: np.array([0.0, 0.0, 0.06]))
     shapes: Mapping[str, Sequence[Shape]] | None = None
     slide: NDArray[np.float64] | None = None
+    lean: NDArray[np.float64] | None = None
 
     def seen_from(
         self, array: AccelerometerArray, run: RunView | None
     ) -> tuple[TurningAxis | None, NDArray[np.float64] | None, str]:
         """Return the axis of rotation and the direction of gravity in the body frame, and what its arrow is called.
 
-        A free body has no axis but the array's own, and gravity is that of its first sample.
+        A free body has no axis but the array's own. Gravity is that of the first sample where it turns in the body.
         """
         if run is not None and run.attitude is not None:
             known = np.flatnonzero(np.isfinite(run.attitude).all(axis=1))
@@ -57,8 +60,33 @@ class DrawnRig:
         turn = Rotation.from_rotvec(self.mounting).inv()
         if self.slide is not None:
             return array.turning_axis, turn.apply(_down()), "gravity"
-        table = TurningAxis(turn.apply(-_down()), turn.apply(-np.asarray(self.centre, dtype=float)))
-        return array.turning_axis or table, turn.apply(_down()), "gravity"
+        own = array.turning_axis or self.axis
+        if self.lean is None:
+            return own, turn.apply(_down()), "gravity"
+        angle = 0.0 if run is None or not np.isfinite(run.angle[0]) else float(run.angle[0])
+        first = self.attitude(np.array([angle]))[0]
+        return own, first.inv().apply(_down()), "gravity at the start"
+
+    @property
+    def axis(self) -> TurningAxis:
+        """The axis of the rig in the body frame."""
+        turn = Rotation.from_rotvec(self.mounting).inv()
+        return TurningAxis(turn.apply(-_down()), turn.apply(-np.asarray(self.centre, dtype=float)))
+
+    def attitude(self, angle: NDArray[np.float64]) -> Rotation:
+        """Return the attitudes of the body, body to world, at angles (n,) about the rig's axis, rad."""
+        about = Rotation.from_rotvec(np.outer(angle, -_down()))
+        axis = Rotation.identity() if self.lean is None else Rotation.from_rotvec(self.lean)
+        return axis * about * Rotation.from_rotvec(self.mounting)
+
+    def places(self, angle: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the places of the body's origin, m, (n, 3); those of a pendulum are lifted above the ground."""
+        centre = np.asarray(self.centre, dtype=float)
+        about = Rotation.from_rotvec(np.outer(angle, -_down()))
+        if self.lean is None:
+            return np.asarray(about.apply(centre))
+        lift = -float(np.linalg.norm(centre)) * _down()
+        return np.asarray(Rotation.from_rotvec(self.lean).apply(about.apply(centre)) + lift)
 
 
 def _down() -> NDArray[np.float64]:

@@ -9,23 +9,20 @@ from functools import partial
 import numpy as np
 
 from gfimu.diagnosis.data.stretch import Stretch
-from gfimu.diagnosis.fit.gauss_newton import FEW, Fit, fit, is_rough, linearly_without
+from gfimu.diagnosis.fit.gauss_newton import Fit, fit
 from gfimu.diagnosis.fit.learn import LEARNINGS, learn_noise, learn_roughness, sharpened, starting_point
 from gfimu.diagnosis.fit.linear import Point, with_residue
-from gfimu.diagnosis.fit.parallel import each_apart
-from gfimu.diagnosis.fit.posterior import remembers_long
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.beam import STARTS, Blocks, grown_sets, leading_sets
 from gfimu.diagnosis.search.screening import Screening, screen
-from gfimu.diagnosis.terms.cause import ALIKE, Cause, effects_of
+from gfimu.diagnosis.search.sets import Key, Sets, has_stalled, prune
+from gfimu.diagnosis.terms.cause import Cause, effects_of
 from gfimu.diagnosis.terms.drive import Drive
 from gfimu.world_model import memory_of
 
-__all__ = ["Explanation", "Sets", "exactly", "excess", "explain", "explained", "hardly_eases", "prune", "reduced"]
+__all__ = ["Explanation", "exactly", "explain", "explained", "reduced"]
 
 Report = Callable[[float, str], None]
-_FAR = 10.0  # numerical: times `Policy.close`
-_Key = frozenset[tuple[str, str]]
 
 
 @dataclass(frozen=True)
@@ -65,129 +62,6 @@ class Explanation:
     interrupted: bool = False
 
 
-class Sets:
-    """Fits of sets of causes under the same nuisances; each set is fitted once."""
-
-    def __init__(self, stretches: Sequence[Stretch], base: Point, policy: Policy) -> None:
-        self.stretches, self.base, self.policy = stretches, base, policy
-        self.found: dict[_Key, Fit] = {}
-        self.count = 0
-
-    def fit(self, points: Sequence[Point]) -> list[Fit | None]:
-        """Fit the causes and drives of points under the base's noise; a point that can't be fitted gives None."""
-        new = {_key(point.causes): point for point in points if _key(point.causes) not in self.found}
-        self.count += len(new)
-        self._keep(each_apart(self._roughly, list(new.values())))
-        # What remembers the drive for long is dear to fit closely: the leader of its kind alone.
-        rough = [one for key in new if (one := self.found.get(key)) is not None and self._is_worth_it(one)]
-        self._keep([self._closely(max(rough, key=_posterior))] if rough else [])
-        return [self.found.get(_key(point.causes)) for point in points]
-
-    def without_each(self, found: Fit) -> list[Fit | None]:
-        """Fit a set without each of its causes; what is far behind in the linear world about it need not be fitted."""
-        missing = [cause for cause in found.causes if found.key - {cause.key} not in self.found]
-        for cause in missing:
-            fewer = linearly_without(found, cause, self.policy)
-            if found.log_posterior - fewer.log_posterior > _FAR * self.policy.close:
-                self._keep([fewer])
-        return self.fit([_less(found, cause) for cause in found.causes])
-
-    def _keep(self, fits: Sequence[Fit | None]) -> None:
-        self.found |= {one.key: one for one in fits if one is not None}
-
-    def _roughly(self, point: Point, policy: Policy | None = None) -> Fit | None:
-        """Fit with the derivative that the point has; unless that is exact, without what remembers for long."""
-        try:
-            point = replace(point, levels=self.base.levels, residue=self.base.residue)
-            return self._own_roughness(fit(self.stretches, point, policy or self.policy, closely=False))
-        except (np.linalg.LinAlgError, ValueError):
-            return None
-
-    def _is_worth_it(self, found: Fit) -> bool:
-        """Whether a fit is rough, and details of what a mode remembers can matter.
-
-        They can't where the mode eases little of what is left without it, nor where far more than noise is left.
-        """
-        if not is_rough(self.stretches, found):
-            return False
-        array = self.stretches[0].model.array
-        short = [cause for cause in found.causes if not remembers_long(effects_of([cause], array, 0))]
-        without = self.found.get(_key(short))
-        if without is not None and hardly_eases(self.stretches, without, found, self.policy):
-            return False
-        nothing = self.found.get(frozenset())
-        allowed = self.policy.usual_excess
-        if nothing is not None:
-            allowed = max(allowed, self.policy.small * excess(self.stretches, nothing))
-        return excess(self.stretches, found) < allowed
-
-    def _closely(self, found: Fit) -> Fit | None:
-        try:
-            return self._own_roughness(fit(self.stretches, found.point, self.policy))
-        except (np.linalg.LinAlgError, ValueError):
-            return None
-
-    def _own_roughness(self, found: Fit) -> Fit:
-        """Learn the roughness of the drives anew where a mode may have made it: that favours what came before."""
-        if not found.point.exact:
-            return found
-        point = learn_roughness(self.stretches, found.point)
-        again = fit(self.stretches, replace(point, residue=self.base.residue), self.policy)
-        return max(found, again, key=_posterior)
-
-    def refit(self, points: Sequence[Point]) -> None:
-        """Fit a set again from other starts, and keep what is more probable; a start that leads back is left there."""
-        first = replace(self.policy, steps=FEW)
-        looks = each_apart(lambda point: self._roughly(replace(point, exact=False), first), points)
-        others = [one for one in looks if one is not None and not _is_alike(one, self.found[one.key])]
-        # What leads after a few steps is followed to its optimum.
-        again = self._roughly(max(others, key=_posterior).point, self.policy) if others else None
-        fits = [one for one in (again,) if one is not None and not _is_alike(one, self.found[one.key])]
-        self.count += len(others)
-        rough = [one for one in fits if self._is_worth_it(one)]
-        closely = self._closely(max(rough, key=_posterior)) if rough else None
-        for one in (*fits, closely):
-            if one is not None and one.log_posterior > self.found[one.key].log_posterior:
-                self.found[one.key] = one
-
-    @property
-    def best(self) -> Fit:
-        """The most probable of all."""
-        return max(self.found.values(), key=_posterior)
-
-    def ranked(self) -> list[Fit]:
-        """All, most probable first."""
-        return sorted(self.found.values(), key=_posterior, reverse=True)
-
-
-def excess(stretches: Sequence[Stretch], found: Fit) -> float:
-    """Return the squares that a fit leaves, over those that noise leaves, less one."""
-    return found.objective / sum(stretch.observations for stretch in stretches) - 1.0
-
-
-def hardly_eases(stretches: Sequence[Stretch], before: Fit, after: Fit, policy: Policy) -> bool:
-    """Whether a fit leaves far more than noise, and hardly less than another: more of the same leads nowhere.
-
-    Of a body in the hand every cause may be a small share of what real chips disagree about.
-    """
-    left = excess(stretches, after)
-    return not policy.free_body and left > max(policy.usual_excess, (1.0 - policy.small) * excess(stretches, before))
-
-
-def _key(causes: Sequence[Cause]) -> _Key:
-    return frozenset(cause.key for cause in causes)
-
-
-def _is_alike(one: Fit, other: Fit) -> bool:
-    """Whether two fits of a set ended at the same optimum over the shapes of its causes."""
-    mine = {cause.key: cause for cause in other.causes}
-    return all(cause.apart(mine[cause.key]) < ALIKE for cause in one.causes)
-
-
-def _posterior(found: Fit) -> float:
-    return found.log_posterior
-
-
 def explain(
     stretches: Sequence[Stretch], policy: Policy, *, start: Point | None = None, report: Report | None = None
 ) -> Explanation:
@@ -205,17 +79,17 @@ def explain(
     report : callable, optional
         Called with the share done and a line of text.
     """
-    tell = report or (lambda share, text: None)
-    tell(0.05, "drive")
+    progress = report or (lambda share, text: None)
+    progress(0.05, "drive")
     if start is not None:
         sets = Sets(stretches, start, policy)
         sets.fit([start, replace(start, causes=())])
-        return _searched(sets, partial(_tell_part, tell, 0, 1))
+        return _searched(sets, partial(_report_part, progress, 0, 1))
     reference = starting_point(stretches, policy.knots)
     starts = _started(stretches, reference, policy)
     found = []
     for number, sets in enumerate(starts):
-        found.append(_searched(sets, partial(_tell_part, tell, number, len(starts))))
+        found.append(_searched(sets, partial(_report_part, progress, number, len(starts))))
         if found[-1].interrupted:
             break
     best = max(found, key=lambda one: one.best.log_posterior)
@@ -227,8 +101,8 @@ def explain(
     )
 
 
-def _tell_part(tell: Report, number: int, count: int, share: float, text: str) -> None:
-    tell(0.1 + 0.8 * (number + share) / count, text)
+def _report_part(progress: Report, number: int, count: int, share: float, text: str) -> None:
+    progress(0.1 + 0.8 * (number + share) / count, text)
 
 
 def _started(stretches: Sequence[Stretch], reference: Point, policy: Policy) -> list[Sets]:
@@ -246,15 +120,15 @@ def _started(stretches: Sequence[Stretch], reference: Point, policy: Policy) -> 
     return [_under(sets, one, [nothing]) for one in ((point,) if closer is point else (closer, point))]
 
 
-def _searched(sets: Sets, tell: Report) -> Explanation:
+def _searched(sets: Sets, progress: Report) -> Explanation:
     """Screen, fit the leaders and learn the nuisances, until the most probable set repeats itself.
 
     An interrupt (Ctrl-C) ends the search with what is known by then.
     """
-    policy, fits, seen, last = sets.policy, 0, set[_Key](), None
+    policy, fits, seen, last = sets.policy, 0, set[Key](), None
     try:
         for number in range(policy.rounds):
-            tell(number / policy.rounds, _leading(sets.best))
+            progress(number / policy.rounds, _leading(sets.best))
             before = sets.best
             last = (before.key, screen(sets.stretches, before.point))
             _fit_leaders(sets, last[1], before, near=number > 0)
@@ -264,7 +138,7 @@ def _searched(sets: Sets, tell: Report) -> Explanation:
             # While a set still grows its noise is that of the largest: a smaller one would pass for more noise.
             best = sets.best if policy.free_body and sets.best.key not in seen else prune(sets)
             fits += sets.count
-            if number > 0 and (best.key in seen or hardly_eases(sets.stretches, before, best, policy)):
+            if number > 0 and (best.key in seen or has_stalled(sets.stretches, before, best, policy)):
                 break
             seen.add(best.key)
             learnt = _relearned(sets.stretches, best, policy, sharpen=best.key != before.key)
@@ -465,28 +339,3 @@ def _widened(cause: Cause, other: Cause) -> Cause:
 
 def _compared_as(found: Fit, other: Fit) -> Fit:
     return replace(found, log_evidence=other.log_evidence, log_posterior=other.log_posterior)
-
-
-def prune(sets: Sets) -> Fit:
-    """Return the most probable set, without causes that the data hardly ask for.
-
-    A cause whose model is known to be inexact leaves a share of what it explains: others must bring more than that.
-    """
-    best = sets.best
-    while best.causes:
-        without = sets.without_each(best)
-        lost = np.array([np.inf if one is None else best.log_posterior - one.log_posterior for one in without])
-        weakest = int(np.argmin(lost))
-        needed = sets.policy.cause_odds
-        if len(best.causes) > 1:
-            left = [cause.family.inexactness * max(by, 0.0) for cause, by in zip(best.causes, lost, strict=True)]
-            needed = sets.policy.extra_odds + sum(part for place, part in enumerate(left) if place != weakest and part)
-        fewer = without[weakest]
-        if fewer is None or lost[weakest] >= needed:
-            return best
-        best = fewer
-    return best
-
-
-def _less(found: Fit, cause: Cause) -> Point:
-    return replace(found.point, causes=tuple(other for other in found.causes if other is not cause))

@@ -11,8 +11,9 @@ from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.learn import LEARNINGS, learn_noise, learn_roughness, starting_point
 from gfimu.diagnosis.fit.linear import Point, with_residue
 from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.search.explain import Sets, explained, prune
+from gfimu.diagnosis.search.explain import explained
 from gfimu.diagnosis.search.nuisance_models import Understanding, understand
+from gfimu.diagnosis.search.sets import Sets, prune
 
 __all__ = ["spread_over_runs", "understand_any_length"]
 

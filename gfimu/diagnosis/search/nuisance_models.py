@@ -21,7 +21,8 @@ from gfimu.diagnosis.fit.learn import learn_noise
 from gfimu.diagnosis.fit.linear import Point, linearise, with_residue
 from gfimu.diagnosis.fit.random_walk import Walk, walk_strength
 from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.search.explain import Explanation, Sets, exactly, explain, hardly_eases, prune
+from gfimu.diagnosis.search.explain import Explanation, exactly, explain
+from gfimu.diagnosis.search.sets import Sets, has_stalled, prune
 from gfimu.diagnosis.terms.jacobian import Jacobian
 from gfimu.diagnosis.terms.residue import Residue
 
@@ -75,8 +76,8 @@ def understand(
     models : collection of str, optional
         Names of the only alternatives to white noise and bias instability alone that are searched; all by default.
     """
-    tell = report or (lambda share, text: None)
-    found = [_understood(stretches, explain(stretches, policy, report=lambda s, text: tell(0.6 * s, text)), policy)]
+    progress = report or (lambda share, text: None)
+    found = [_understood(stretches, explain(stretches, policy, report=lambda s, text: progress(0.6 * s, text)), policy)]
     plain, derivatives = found[0].explanation, _Derivatives(stretches)
     if plain.interrupted:
         return found[0]
@@ -85,7 +86,7 @@ def understand(
     offered = [(_offers(stretches, plain, model, derivatives), model) for model in alternatives]
     # The most promising first: what it finds leaves the others little to search for.
     for offers, model in sorted(offered, key=lambda pair: _most(pair[0]) - pair[1].odds, reverse=True):
-        tell(0.6, model.name)
+        progress(0.6, model.name)
         odds = model.odds + rough
         others = {one.explanation.best.key: one.explanation for one in found[1:]}
         beside = [_offers(stretches, one, model, derivatives) for key, one in others.items() if key != plain.best.key]
@@ -227,7 +228,7 @@ def _start(
             leading = tried if leading is None or tried.log_posterior > leading.log_posterior else leading
     if leading is None or leading.log_posterior < best - policy.worth_a_search:
         return None
-    return None if hardly_eases(stretches, known, leading, policy) else leading.point
+    return None if has_stalled(stretches, known, leading, policy) else leading.point
 
 
 def _promise(stretches: Sequence[Stretch], before: Point, after: Point, taken: _Taken) -> float:

@@ -13,21 +13,19 @@ from scipy.special import expit
 from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.criticism.lack_of_fit import LackOfFit
 from gfimu.diagnosis.criticism.slow_noise import LoudestChannel, loudest_channel, white_factor
+from gfimu.diagnosis.criticism.views.body_view import body_noise_floor
 from gfimu.diagnosis.criticism.views.run_view import RunView
-from gfimu.diagnosis.data.body.run import BodyRun
+from gfimu.diagnosis.criticism.views.run_views import run_views
 from gfimu.diagnosis.data.body.stretch import BodyStretch
 from gfimu.diagnosis.data.prepared_runs import PreparedRuns
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.gauss_newton import Fit
-from gfimu.diagnosis.fit.learn import starting_point
 from gfimu.diagnosis.fit.linear import linearise
 from gfimu.diagnosis.fit.random_walk import Walk
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.explain import Explanation
 from gfimu.diagnosis.search.nuisance_models import Understanding
 from gfimu.diagnosis.terms.cause import Cause, effects_of
-from gfimu.diagnosis.terms.spline import AngleSpline
-from gfimu.diagnosis.verdict.body_view import body_noise_floor, body_view
 from gfimu.diagnosis.verdict.naming import (
     capped,
     channel_share,
@@ -38,11 +36,12 @@ from gfimu.diagnosis.verdict.naming import (
     probabilities,
     rival_list,
 )
+from gfimu.diagnosis.verdict.parts import NamedCause, Residual, Unexplained
 from gfimu.diagnosis.verdict.undetermined import undetermined, undetermined_sentence
-from gfimu.diagnosis.verdict.verdict import Diagnosis, NamedCause, Residual, Unexplained
+from gfimu.diagnosis.verdict.verdict import Diagnosis
 from gfimu.diagnosis.verdict.wording import Notes, verdict_sentences
 from gfimu.geometry.array import AccelerometerArray
-from gfimu.world_model import Effect, Spin, WorldModel, is_linear, is_of_one_recording
+from gfimu.world_model import Effect, WorldModel, is_of_one_recording
 
 __all__ = ["Described", "conclude", "is_dominant", "is_unknown", "named_causes"]
 
@@ -231,7 +230,7 @@ def conclude(
     believed = _believed(explanation, described, unknown=unknown)
     loudest = loudest_channel(explanation.stretches, believed.point, policy)
     apart = stands_out(explanation, left, policy)
-    runs = _views(prepared, explanation.stretches, believed)
+    runs = run_views(prepared, explanation.stretches, believed)
     if unknown:
         verdict, causes = "unknown", tuple(found)
     elif rivals:
@@ -277,7 +276,7 @@ def conclude(
         rest=left.signature if left.log_odds > policy.lack_odds else "",
     )
     words = verdict_sentences(verdict, causes, residual, gain, unexplained, withdrawn, notes)
-    others_told = rival_list(explanation, policy)
+    weaker = rival_list(explanation, policy)
     # Of a table those of the causes alone: it could have many others, each with something that it does not show.
     looked_at = None if policy.free_body else {cause.effect for cause in causes}
     open_ones = undetermined(explanation.screening, array, policy.least_share, looked_at)
@@ -285,7 +284,7 @@ def conclude(
     if of_time:
         words = (*words, _of_absolute_time(of_time))
     listed = tuple(one.to_dict() for one in open_ones)
-    return Diagnosis(verdict, causes, residual, gain, unexplained, others_told, twin, runs, words, noise, listed)
+    return Diagnosis(verdict, causes, residual, gain, unexplained, weaker, twin, runs, words, noise, listed)
 
 
 def _believed(explanation: Explanation, described: Described | None, *, unknown: bool) -> Fit:
@@ -369,50 +368,6 @@ def _coefficients(terms: Sequence[Cause], stretch: Stretch) -> dict[str, float]:
         for size, value in zip(cause.family.sizes(array), cause.sizes(array, 0), strict=True)
         if value
     }
-
-
-def _views(prepared: PreparedRuns, stretches: Sequence[Stretch], believed: Fit) -> tuple[RunView, ...]:
-    """Collect each run for pictures: before is the given twin driven by the reference alone."""
-    return tuple(_view(prepared, number, stretches, believed) for number in range(len(prepared.runs)))
-
-
-def _view(prepared: PreparedRuns, number: int, stretches: Sequence[Stretch], believed: Fit) -> RunView:
-    run = prepared.runs[number]
-    if isinstance(run, BodyRun):
-        given = tuple(replace(stretch, known=()) for stretch in stretches)
-        plain = linearise(given, replace(believed.point, causes=())).posteriors[number]
-        return body_view(plain, linearise(stretches, believed.point).posteriors[number])
-    before, after, states = [], [], []
-    for stretch, drive in zip(stretches, believed.point.drives, strict=True):
-        if stretch.index != number:
-            continue
-        effects = effects_of(believed.causes, stretch.model.array, stretch.index)
-        after.append(stretch.predict(effects, drive.spin))
-        states.append(stretch.motion([*stretch.known, *effects], drive.spin).at(stretch.run.t))
-        bare = replace(stretch, known=())
-        before.append(bare.predict([], _by_reference(bare, drive.spline)))
-    first, second = np.concatenate(before), np.concatenate(after)
-    return RunView(
-        run.name,
-        run.t,
-        run.readings,
-        run.valid,
-        first[:, :-1],
-        second[:, :-1],
-        run.reference,
-        first[:, -1],
-        second[:, -1],
-        np.concatenate([state.angle for state in states]),
-        np.concatenate([state.rate for state in states]),
-        np.concatenate([state.acceleration for state in states]),
-        run.temperature,
-        believed.point.levels[0].white[:-1],
-        linear=is_linear(stretches[0].model),
-    )
-
-
-def _by_reference(stretch: Stretch, spline: AngleSpline) -> Spin:
-    return starting_point([stretch], spline.spacing).drives[0].spin
 
 
 def _noise_floor(runs: Sequence[RunView], stretch: Stretch, believed: Fit) -> float:

@@ -12,7 +12,7 @@ import numpy as np
 
 from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.verdict.verdict import NamedCause, Residual
+from gfimu.diagnosis.verdict.parts import NamedCause, Residual
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.world_model import EffectFamily, bound_of
 
@@ -59,7 +59,7 @@ def judge(gain: Gain, residual: Residual, causes: Sequence[NamedCause], policy: 
         return Judgement()
     figure = _held_out_figure(gain, policy)
     if figure:
-        return Judgement(True, f"{_found(causes)} do not predict data the fit never saw: {figure}")
+        return Judgement(True, f"{_found(causes)} do not predict validation data: {figure}")
     before, after = residual.rms_before, residual.rms_after
     if after > max((1.0 + policy.noise_accuracy) * before, (1.0 + policy.small) * residual.noise_floor):
         worse = f"the prediction error rises from {before:.3g} to {after:.3g} m/s²"

@@ -14,7 +14,8 @@ import numpy as np
 from scipy.special import expit
 
 from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.verdict.verdict import Diagnosis, NamedCause
+from gfimu.diagnosis.verdict.parts import NamedCause
+from gfimu.diagnosis.verdict.verdict import Diagnosis
 
 __all__ = [
     "LibraryEvidence",
@@ -39,7 +40,7 @@ class LibraryEvidence:
         Log odds of the strongest lack of fit beside the causes, nats, at least ``Policy.lack_odds`` where the slow
         noise of a channel stands out; 0 where chance is likelier.
     confirmed : bool
-        Whether another recording, which the fit never saw, was predicted.
+        Whether another recording, as validation data, was predicted.
     """
 
     coincidence: float = 0.0
@@ -158,7 +159,8 @@ def with_wider_library(found: Diagnosis) -> Diagnosis:
 def _sentence(least: float, evidence: LibraryEvidence) -> str:
     """Say how likely it is that the truth is among the effects that were tried, and what would test it."""
     stated = (
-        f"What is named is the truth, confounded with nothing outside the library, with a probability of {least:.0%}"
+        "What is named is the truth, confounded with nothing outside the library, with a probability of "
+        f"{100 * least:.0f} %"
     )
     if evidence.confirmed:
         return stated

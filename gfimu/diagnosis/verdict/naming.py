@@ -15,7 +15,7 @@ from gfimu.diagnosis.fit.gauss_newton import Fit
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.explain import Explanation
 from gfimu.diagnosis.terms.cause import Cause
-from gfimu.diagnosis.verdict.verdict import NamedCause, Rival
+from gfimu.diagnosis.verdict.parts import NamedCause, Rival
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.world_model import Effect, EffectFamily, dependence_of
 

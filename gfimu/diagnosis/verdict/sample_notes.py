@@ -9,7 +9,8 @@ import numpy as np
 
 from gfimu.diagnosis.data.run import Run
 from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.verdict.verdict import Diagnosis, NamedCause
+from gfimu.diagnosis.verdict.parts import NamedCause
+from gfimu.diagnosis.verdict.verdict import Diagnosis
 from gfimu.world_model import WorldModel
 
 __all__ = ["with_reference_clock", "with_sample_notes"]

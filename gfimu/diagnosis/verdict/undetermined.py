@@ -101,6 +101,6 @@ def undetermined_sentence(combinations: tuple[Undetermined, ...]) -> str:
     first = list({one.effect: one for one in reversed(combinations)}.values())[::-1][:_LISTED]
     named = "; ".join(one.text for one in first)
     return (
-        f"These data can't determine {len(combinations)} combinations, which stay at zero with the ± of what is usual, "
-        f"such as {named}."
+        f"These data can't determine {len(combinations)} combinations, which stay at zero with the standard "
+        f"deviation of their prior, such as {named}."
     )

@@ -15,167 +15,16 @@ from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.criticism.views.rigid_motion import RigidMotion
 from gfimu.diagnosis.criticism.views.run_view import RunView
 from gfimu.diagnosis.policy import Policy
+from gfimu.diagnosis.verdict.parts import NamedCause, Residual, Rival, Unexplained
 from gfimu.files.atomic_file import write_text
+from gfimu.lazy_names import command_above
 from gfimu.results import Panel, RunResult, Series
 from gfimu.short_repr import joined
 from gfimu.world_model import WorldModel
 
-__all__ = [
-    "FORMAT_VERSION",
-    "Diagnosis",
-    "NamedCause",
-    "Residual",
-    "Rival",
-    "Unexplained",
-]
+__all__ = ["FORMAT_VERSION", "Diagnosis"]
 
 FORMAT_VERSION = 1  # numerical: of verdict.json, no threshold
-
-
-@dataclass(frozen=True)
-class NamedCause:
-    """One cause in a verdict: an effect with its sizes, their standard deviations and a probability.
-
-    Parameters
-    ----------
-    effect : str
-        Contract name.
-    parameters : mapping
-        Values by contract key (numbers, names or lists of names).
-    std : mapping
-        Standard deviations of those that are estimated.
-    probability : float
-        Probability that this effect is among the causes.
-    place : str
-        Where it acts (``"chip a2"``), empty where it has only one place.
-    not_distinguishable_from : tuple of str
-        Effects that explain these data as well.
-    would_be_separated_by : str
-        Excitation that would separate them.
-    why : str
-        One sentence: where and how it shows.
-    log_odds : float
-        Log odds of the explanation with this cause against the best one without it.
-    unlisted : mapping of str to str
-        Of an effect that the contract has no name for: its ``place`` in the chain, the ``dependence`` on the motion and
-        the ``pattern`` of its sizes. Empty for all others.
-
-    Examples
-    --------
-    >>> import gfimu
-    >>> cause = gfimu.diagnose("run.parquet", "cube12_turntable").causes[0]  # doctest: +SKIP
-    >>> cause.parameters, cause.std  # doctest: +SKIP
-    """
-
-    effect: str
-    parameters: Mapping[str, Any]
-    std: Mapping[str, float]
-    probability: float
-    place: str = ""
-    not_distinguishable_from: tuple[str, ...] = ()
-    would_be_separated_by: str = ""
-    why: str = ""
-    log_odds: float = 0.0
-    unlisted: Mapping[str, str] = field(default_factory=dict)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON form of the contract."""
-        parameters = {
-            key: {"value": value, "std": self.std.get(key)} if isinstance(value, int | float) else {"value": value}
-            for key, value in self.parameters.items()
-        }
-        return {
-            "effect": self.effect,
-            "parameters": parameters,
-            "probability": self.probability,
-            "place": self.place,
-            "not_distinguishable_from": list(self.not_distinguishable_from),
-            "would_be_separated_by": self.would_be_separated_by,
-            "why": self.why,
-            "log_odds": self.log_odds,
-            **({"effect": "unlisted", "name": self.effect, **self.unlisted} if self.unlisted else {}),
-        }
-
-
-@dataclass(frozen=True)
-class Rival:
-    """Another explanation and why it lost.
-
-    Parameters
-    ----------
-    effects : tuple of str
-        Its effects.
-    log_odds : float
-        Log odds against the verdict (negative: less probable).
-    why : str
-        One sentence.
-    """
-
-    effects: tuple[str, ...]
-    log_odds: float
-    why: str = ""
-
-
-@dataclass(frozen=True)
-class Residual:
-    """Size of the residual before and after, m/s², over valid samples of all channels.
-
-    ``before_by_channel`` and ``after_by_channel`` hold it per channel; ``noise_floor`` is the rms of the noise as
-    estimated from the data.
-    """
-
-    rms_before: float
-    rms_after: float
-    noise_floor: float
-    before_by_channel: Mapping[str, float]
-    after_by_channel: Mapping[str, float]
-
-    @classmethod
-    def of_views(cls, views: Sequence[RunView], channels: Sequence[str], noise_floor: float) -> Residual:
-        """Measure the residual over the valid samples of all runs."""
-        count = np.maximum(np.sum([view.valid.sum(axis=0) for view in views], axis=0), 1)
-        before, after = (
-            np.sum([np.sum(np.where(v.valid, v.measured - getattr(v, name), 0.0) ** 2, axis=0) for v in views], axis=0)
-            for name in ("before", "after")
-        )
-        return cls(
-            float(np.sqrt(before.sum() / count.sum())),
-            float(np.sqrt(after.sum() / count.sum())),
-            noise_floor,
-            dict(zip(channels, map(float, np.sqrt(before / count)), strict=True)),
-            dict(zip(channels, map(float, np.sqrt(after / count)), strict=True)),
-        )
-
-
-@dataclass(frozen=True)
-class Unexplained:
-    """What is left and nothing in the library explains.
-
-    Parameters
-    ----------
-    significant : bool
-        Whether it is more than chance.
-    signature : str
-        Which channels, which dependence, in words.
-    log_odds : float
-        Log odds of the strongest term against chance.
-    surrogate : mapping of str to float
-        Data-driven terms: coefficients by what they are of, with its unit, and function: ``"a11_m_s2: rate²"``.
-    extends_twin : bool
-        Whether such terms are in the extended twin, as they predict data that their fit never saw.
-    left_out : int
-        How many of the terms are not in it, as they are of absolute time, which another recording has otherwise.
-    mistake : str
-        A mistake in the files that makes the simulation fit; empty where none does.
-    """
-
-    significant: bool = False
-    signature: str = ""
-    log_odds: float = 0.0
-    surrogate: Mapping[str, float] = field(default_factory=dict)
-    extends_twin: bool = False
-    left_out: int = 0
-    mistake: str = ""
 
 
 @dataclass(frozen=True)
@@ -278,7 +127,7 @@ class Diagnosis(RunResult):
         if np.isfinite(gain.share_of_excess_removed):
             std = f" ± {100 * gain.share_std:.2g} %" if np.isfinite(gain.share_std) else ""
             facts.append(
-                (f"removed on unseen data ({gain.held_out})", f"{100 * gain.share_of_excess_removed:.3g} %{std}")
+                (f"removed on validation data ({gain.held_out})", f"{100 * gain.share_of_excess_removed:.3g} %{std}")
             )
         if np.isfinite(self.library_probability):
             facts.append(("probability that the library holds the cause", f"{100 * self.library_probability:.3g} %"))
@@ -339,9 +188,7 @@ class Diagnosis(RunResult):
         InputError
             If the folder can't be written.
         """
-        import gfimu  # the report stands above the verdict
-
-        return gfimu.write_report(self, folder)
+        return Path(command_above("write_report")(self, folder))
 
     @property
     def in_part(self) -> bool:
@@ -360,8 +207,6 @@ class Diagnosis(RunResult):
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON form of the contract."""
-        residual = self.residual
-        gain = self.gain
         return {
             "format_version": FORMAT_VERSION,
             "verdict": self.verdict,
@@ -371,39 +216,11 @@ class Diagnosis(RunResult):
             "sentences": list(self.sentences),
             "reference_clock": dict(self.reference_clock) or None,
             "causes": [cause.to_dict() for cause in self.causes],
-            "residual": {
-                "rms_before": residual.rms_before,
-                "rms_after": residual.rms_after,
-                "noise_floor": residual.noise_floor,
-                "unit": "m/s2",
-                "before_by_channel": dict(residual.before_by_channel),
-                "after_by_channel": dict(residual.after_by_channel),
-            },
-            "gain": {
-                "held_out": gain.held_out,
-                "held_out_rms_before": gain.rms_before,
-                "held_out_rms_after": gain.rms_after,
-                "share_of_excess_removed": gain.share_of_excess_removed,
-                "share_of_excess_removed_std": gain.share_std,
-                "share_in_any_recording": gain.share_in_any_recording,
-                "log_likelihood_per_sample": gain.log_likelihood_per_sample,
-                "log_likelihood_std": gain.log_likelihood_std,
-                "rate_rmse_before_rad_s": gain.rate_rmse_before,
-                "rate_rmse_after_rad_s": gain.rate_rmse_after,
-                "position_drift_before_m": gain.drift_before,
-                "position_drift_after_m": gain.drift_after,
-            },
-            "unexplained": {
-                "significant": self.unexplained.significant,
-                "signature": self.unexplained.signature,
-                "log_odds": self.unexplained.log_odds,
-                "surrogate": dict(self.unexplained.surrogate),
-                "extends_twin": self.unexplained.extends_twin,
-                "left_out": self.unexplained.left_out,
-                "mistake": self.unexplained.mistake,
-            },
+            "residual": self.residual.to_dict(),
+            "gain": self.gain.to_dict(),
+            "unexplained": self.unexplained.to_dict(),
             "rigid_motion": None if self.rigid is None else self.rigid.to_dict(),
-            "rivals": [{"effects": list(r.effects), "log_odds": r.log_odds, "why": r.why} for r in self.rivals],
+            "rivals": [rival.to_dict() for rival in self.rivals],
             "noise": dict(self.noise),
             "undetermined": [dict(one) for one in self.undetermined],
         }

@@ -9,7 +9,7 @@ import numpy as np
 
 from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.verdict.verdict import NamedCause, Residual, Unexplained
+from gfimu.diagnosis.verdict.parts import NamedCause, Residual, Unexplained
 from gfimu.units import STANDARD_GRAVITY
 
 __all__ = ["SAME_SHARE", "Notes", "verdict_sentences"]
@@ -86,26 +86,26 @@ def _held_out(residual: Residual, gain: Gain) -> list[str]:
     words = []
     if np.isfinite(gain.share_of_excess_removed):
         words.append(
-            f"On data the fit never saw ({gain.held_out}), {gain.share_of_excess_removed:.1%} of the excess is gone"
-            f"{_anywhere(gain)}."
+            f"On validation data ({gain.held_out}), {100 * gain.share_of_excess_removed:.1f} % of the excess "
+            f"is gone{_anywhere(gain)}."
         )
         words += _far_below(residual, gain)
     if np.isnan(gain.rms_after):
-        words.append(f"On data the fit never saw ({gain.held_out}) the gain is within the noise and can't be measured.")
+        words.append(f"On validation data ({gain.held_out}) the gain is within the noise and can't be measured.")
     return words
 
 
 def _left_over(verdict: str, residual: Residual, unexplained: Unexplained, rest: str) -> list[str]:
     """Say what the causes leave; an unknown verdict says it at first."""
     if unexplained.significant:
-        sentence = f"Something is left that nothing in the library explains: {unexplained.signature}."
+        sentence = f"A significant residual remains that nothing in the library explains: {unexplained.signature}."
         return [] if verdict == "unknown" else [sentence]
     over = residual.rms_after / max(residual.noise_floor, 1e-12)
     if verdict != "explained" or over <= 1.0 + Policy.small:
         return []
     sentence = (
-        f"What is left is {over:.2f} times the noise{f' ({rest})' if rest else ''}: "
-        "little against what is explained, and ± holds it."
+        f"The remaining residual is {over:.2f} times the noise{f' ({rest})' if rest else ''}: "
+        "small compared with what is explained, and included in the standard deviations."
     )
     return [sentence]
 
@@ -131,11 +131,11 @@ def _anywhere(gain: Gain) -> str:
     share = gain.share_in_any_recording
     if not np.isfinite(share) or abs(share - gain.share_of_excess_removed) < SAME_SHARE:
         return ""
-    return f"; without terms of absolute time, as in any other recording, {max(share, 0.0):.1%}"
+    return f"; without terms of absolute time, as in any other recording, {100 * max(share, 0.0):.1f} %"
 
 
 def _far_below(residual: Residual, gain: Gain) -> list[str]:
-    """Say where far less is removed on unseen data than on the fitted ones."""
+    """Say where far less is removed on validation data than on the fitted ones."""
     excess, left = (rms**2 - residual.noise_floor**2 for rms in (residual.rms_before, residual.rms_after))
     if excess <= 0.0:
         return []
@@ -144,8 +144,8 @@ def _far_below(residual: Residual, gain: Gain) -> list[str]:
     if share + 2.0 * float(np.nan_to_num(gain.share_std)) > fitted - Policy.sizeable:
         return []
     sentence = (
-        f"On the fitted data {fitted:.0%} of it is gone: so much more than on unseen data that the sizes may belong to "
-        "this recording alone; confirm them on another one."
+        f"On the fitted data {100 * fitted:.0f} % of it is gone: so much more than on validation data that the sizes "
+        "may belong to this recording alone; confirm them on another one."
     )
     return [sentence]
 
@@ -158,8 +158,8 @@ def _headline(verdict: str, causes: Sequence[NamedCause], unexplained: Unexplain
         return "The simulation agrees with the measurement: nothing was found beyond the sensors' own noise."
     if verdict == "explained" and gain.share_of_excess_removed < 1.0 - Policy.small:
         return (
-            f"The simulation is wrong in part because of {names}: {gain.share_of_excess_removed:.0%} of the excess is "
-            "gone on data the fit never saw."
+            f"The simulation is wrong in part because of {names}: {100 * gain.share_of_excess_removed:.0f} % of the "
+            "excess is gone on validation data."
         )
     if verdict == "explained":
         return f"The simulation is wrong because of {names}."
@@ -174,7 +174,7 @@ def _headline(verdict: str, causes: Sequence[NamedCause], unexplained: Unexplain
 def _surrogate_sentence(terms: int, left_out: int) -> str:
     if not terms and not left_out:
         return (
-            "No function of the motion, the angle or time predicts it on data the fit never saw, so the extended twin "
+            "No function of the motion, the angle or time predicts it on validation data, so the extended twin "
             "is without it."
         )
     clock = ""

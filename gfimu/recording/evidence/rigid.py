@@ -18,36 +18,22 @@ from typing import Any
 import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
-from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.geometry.kinematics import omega_products
 from gfimu.parts.limits import PartLimits
-from gfimu.rate.integration import integrate_samples
 from gfimu.recording.evidence.rotation_normal import rotation_normal
-from gfimu.recording.recording import Recording
-from gfimu.recording.rest import detect_rest
 from gfimu.units import STANDARD_GRAVITY
 
-__all__ = ["Costs", "Evidence", "Otherwise", "Window", "gather"]
+__all__ = ["FEWEST", "Costs", "Evidence", "Matrices", "Otherwise", "Window", "product_slopes", "rates_of"]
 
 ALIGNMENT = 0.05  # rad, by which a sensing axis may be off on a real board: "turned by degrees"
-_RESTS = 8  # stretches of rest that are used, the longest
-_MOST_RESTS = 200  # stretches of rest that are looked at, the longest
-_FEWEST_STILL = 10  # samples of a rest in a window of motion, after decimation
-_STILL = 0.02  # of the size of the mean readings, by which readings at rest may scatter, in whatever unit they are
-_WINDOW = 2000  # samples of a window of motion, after decimation
-_ROWS = 200  # of them that are compared
-_RATE = 100.0  # Hz, to which faster recordings are averaged
-_NOMINAL_RATES = (4.0, 20_000.0)  # Hz; outside of them rest is looked for as if at 100 Hz
+FEWEST = 30  # samples of a stretch that is compared
 _LEAST_PARITY = 3  # combinations free of all motion that make the integration of α needless
 _DIAGONAL = np.diag_indices(6)
 _ITERATIONS = 15
 _NO_LEAK = 1e-6  # rad/s² per rad²/s²
 _WEAK = 0.1  # products seen more weakly than this share of the best are not used to clean α
-_FEWEST = 30  # samples
-_TABLE = {"tacho_rad_s", "command_rad_s", "angle_rad"}  # references of a body that turns about one axis only
 
 
 @dataclass(frozen=True)
@@ -70,6 +56,8 @@ class Otherwise:
         Channels that it is about.
     parts : tuple of Otherwise
         The two ways that it is made of, if it is.
+    brief : str
+        What it is about in a few words, for a list; the channels by default.
     """
 
     kind: str
@@ -79,6 +67,12 @@ class Otherwise:
     array: AccelerometerArray | None = None
     channels: tuple[str, ...] = ()
     parts: tuple[Otherwise, ...] = ()
+    brief: str = ""
+
+    @property
+    def about(self) -> str:
+        """What it is about, in a few words."""
+        return self.brief or " and ".join(self.channels)
 
     def is_one_of(self, kinds: Collection[str]) -> bool:
         """Whether the way, or one of its parts, is of one of these kinds."""
@@ -122,16 +116,20 @@ class Costs:
 
 @dataclass(frozen=True)
 class Window:
-    """Samples of a stretch of motion: readings (m, c), their integrals from its start (m, c), times since (m,), s."""
+    """Samples of a stretch of motion: readings (m, c), their integrals from its start (m, c), times since (m,), s.
+
+    ``tacho`` (m,), rad/s: NaN where there is none.
+    """
 
     readings: NDArray[np.float64]
     integrals: NDArray[np.float64]
     t: NDArray[np.float64]
+    tacho: NDArray[np.float64]
     noise_share: float  # variance of the noise over that of one sample
 
 
 @dataclass(frozen=True)
-class _Matrices:
+class Matrices:
     """What an array makes of its readings: α = A y, N y = M s(ω), and P y = 0 for any motion.
 
     ``clean``: whether no products of ω are left in A y; without that the motion is not judged.
@@ -144,7 +142,8 @@ class _Matrices:
     parity: NDArray[np.float64]  # (k, c), orthonormal rows
 
     @classmethod
-    def of(cls, array: AccelerometerArray, alive: NDArray[np.bool_]) -> _Matrices:
+    def of(cls, array: AccelerometerArray, alive: NDArray[np.bool_]) -> Matrices:
+        """Return the matrices of the channels (c,) of an array that are alive."""
         scale = np.array([array.length_unit] * 3 + [1.0] * 3)
         j, q = array.regression_matrix[alive] / scale, array.centripetal_matrix[alive] / array.length_unit
         alpha = np.linalg.pinv(j)[:3] / array.length_unit
@@ -196,7 +195,7 @@ class Evidence:
     quiet: NDArray[np.float64]
     sample_rate: float
     unit_from: str = ""
-    _cache: dict[str, _Matrices] = field(default_factory=dict)
+    _cache: dict[str, Matrices] = field(default_factory=dict)
 
     @property
     def has_parity(self) -> bool:
@@ -249,9 +248,9 @@ class Evidence:
             motion, motion_noise = energy / allowed, noise / allowed
         return Costs(rest, level, parity, motion, parity_noise, motion_noise, worst, fitted)
 
-    def _matrices(self, array: AccelerometerArray) -> _Matrices:
+    def _matrices(self, array: AccelerometerArray) -> Matrices:
         if array.name not in self._cache:
-            self._cache[array.name] = _Matrices.of(array, self.alive)
+            self._cache[array.name] = Matrices.of(array, self.alive)
         return self._cache[array.name]
 
     def _allowed(self, spread: NDArray[np.float64]) -> float:
@@ -288,6 +287,28 @@ class Evidence:
                 levels.append(((size - STANDARD_GRAVITY) / free) ** 2)
         return float(np.mean(costs)), float(np.mean(levels)), float(np.max(worst))
 
+    def follows_tacho(self, way: Otherwise) -> float:
+        """Return the correlation of the turning about the upward direction with the tachometer, each without its trend.
+
+        It is negative for a mirrored way to read the file, and 0 where there is no tachometer or no upward direction.
+        """
+        if self.up is None or not self.windows:
+            return 0.0
+        columns = way.columns[np.ix_(self.alive, self.alive)]
+        alpha = self._matrices(way.array or self.array).alpha
+        product = power = other = 0.0
+        for window in self.windows:
+            known = np.isfinite(window.tacho)
+            turned = window.integrals[known] @ columns.T @ alpha.T @ self.up
+            both = np.column_stack([turned, window.tacho[known]])
+            if len(both) < FEWEST:
+                continue
+            line = np.column_stack([np.ones(len(both)), window.t[known]])
+            both -= line @ np.linalg.lstsq(line, both, rcond=None)[0]
+            squares = both.T @ both
+            product, power, other = product + squares[0, 1], power + squares[0, 0], other + squares[1, 1]
+        return float(product / np.sqrt(power * other)) if power * other > 0.0 else 0.0
+
     def gravity_at_rest(self, way: Otherwise) -> NDArray[np.float64]:
         """Return the size of the specific force of each rest, shape (k,), m/s²."""
         axes = (way.array or self.array).axes[self.alive]
@@ -301,10 +322,10 @@ class Evidence:
         both = np.hstack([axes, centripetal]) / limit[:, None]
         products = np.linalg.lstsq(both, mean / limit, rcond=1e-9)[0][3:]
         best = np.full(len(mean), np.inf)
-        for start in _rates_of(products):
+        for start in rates_of(products):
             omega = start
             for _ in range(_ITERATIONS):
-                slope = np.hstack([axes, centripetal @ _slopes(omega[None])[0]]) / limit[:, None]
+                slope = np.hstack([axes, centripetal @ product_slopes(omega[None])[0]]) / limit[:, None]
                 inside = (mean - centripetal @ omega_products(omega)) / limit
                 step = np.linalg.lstsq(slope, inside, rcond=1e-9)[0]
                 omega = omega + step[3:]
@@ -319,7 +340,7 @@ class Evidence:
         window: Window,
         columns: NDArray[np.float64],
         time: float,
-        matrices: _Matrices,
+        matrices: Matrices,
         further: NDArray[np.float64] | None,
     ) -> tuple[tuple[float, float, float], NDArray[np.float64]]:
         """Return the energy that no rigid motion explains in a window, that of noise, the largest allowed; and the fit.
@@ -338,7 +359,7 @@ class Evidence:
         prior = noise / len(matrices.null) / np.maximum(bias_std, 1e-9) ** 2
         seen = np.linalg.pinv(matrices.sensitivity, rcond=0.05)
         fastest = int(np.argmax(np.sum(z**2, axis=1)))  # where biases matter least
-        rates = _rates_of(seen @ z[:5].mean(axis=0)) + [rate - turned[fastest] for rate in _rates_of(seen @ z[fastest])]
+        rates = rates_of(seen @ z[:5].mean(axis=0)) + [rate - turned[fastest] for rate in rates_of(seen @ z[fastest])]
         energy, fitted = np.inf, np.zeros(6)
         starts = [np.concatenate([rate, np.zeros(3)]) for rate in [np.zeros(3), *rates]]
         for start in starts if further is None else [*starts, further]:
@@ -354,7 +375,7 @@ def _unexplained(
     z: NDArray[np.float64],
     turned: NDArray[np.float64],
     t: NDArray[np.float64],
-    matrices: _Matrices,
+    matrices: Matrices,
     start: NDArray[np.float64],
     prior: NDArray[np.float64],
 ) -> tuple[float, NDArray[np.float64]]:
@@ -392,7 +413,7 @@ def _unexplained(
     return best, kept
 
 
-def _slopes(omega: NDArray[np.float64]) -> NDArray[np.float64]:
+def product_slopes(omega: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the derivatives of the products of ω (m, 3), shape (m, 6, 3)."""
     x, y, z = omega.T
     o = np.zeros_like(x)
@@ -400,7 +421,7 @@ def _slopes(omega: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
-def _rates_of(products: NDArray[np.floating[Any]]) -> list[NDArray[np.float64]]:
+def rates_of(products: NDArray[np.floating[Any]]) -> list[NDArray[np.float64]]:
     """Return the two rates whose products (6,) are nearest to these."""
     xx, yy, zz, xy, xz, yz = products
     values, vectors = np.linalg.eigh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
@@ -421,115 +442,3 @@ def _least_largest(axes: NDArray[np.float64], mean: NDArray[np.float64], limit: 
         bounds=[(None, None)] * 3 + [(0.0, None)],
     )
     return float(found.fun) if found.success else 0.0
-
-
-def gather(recording: Recording, array: AccelerometerArray, limits: PartLimits, alive: NDArray[np.bool_]) -> Evidence:
-    """Reduce a recording to what shows whether its channels fit one rigid body.
-
-    Raises
-    ------
-    InputError
-        As `gfimu.Recording.for_array`.
-    """
-    readings = np.where(alive, recording.for_array(array), 0.0)  # (n, c)
-    whole: NDArray[np.bool_] = np.asarray(np.isfinite(readings).all(axis=1))
-    rests = _rests(recording, array, readings, whole, alive, limits.noise)
-    step = max(1, int(np.count_nonzero(whole)) // 20_000)
-    covariance = np.cov(readings[whole][::step].T) if np.count_nonzero(whole) > 2 else np.zeros((0, 0))
-    up = None
-    if "mounting_rotvec_rad" in recording.metadata and _TABLE & set(recording.reference):
-        up = Rotation.from_rotvec(recording.mounting_rotvec).inv().apply([0.0, 0.0, 1.0])
-    longest = sorted(sorted(rests, key=lambda rest: rest.start - rest.stop)[:_RESTS], key=lambda rest: rest.start)
-    means = np.array([readings[rest][whole[rest]].mean(axis=0) for rest in longest]).reshape(-1, array.n_channels)
-    windows = _windows(recording, readings[:, alive], whole, rests)
-    quiet, rate = _quiet(readings), recording.sample_rate
-    return Evidence(array, alive, limits, means, covariance, windows, up, quiet, rate, recording.unit_from)
-
-
-def _rests(
-    recording: Recording,
-    array: AccelerometerArray,
-    readings: NDArray[np.float64],
-    whole: NDArray[np.bool_],
-    alive: NDArray[np.bool_],
-    noise: NDArray[np.float64],
-) -> list[slice]:
-    """Return the stretches of rest, the longest ones of many."""
-    t = recording.t_s
-    rate = recording.sample_rate
-    if not _NOMINAL_RATES[0] < rate < _NOMINAL_RATES[1]:
-        t = np.arange(len(t)) / _RATE
-    names = tuple(name for name, lives in zip(array.channels, alive, strict=True) if lives)
-    try:
-        tacho = {name: recording.reference[name] for name in ("tacho_rad_s",) if name in recording.reference}
-        rest = detect_rest(Recording(t, readings[:, alive], names, tacho))
-    except InputError:
-        return []
-    longest = np.sort(np.argsort(-rest.lengths, kind="stable")[:_MOST_RESTS])
-    found = [slice(int(rest.start[place]), int(rest.stop[place])) for place in longest]
-    kept = []
-    for rows in found:
-        inside = readings[rows][whole[rows]]
-        if len(inside) >= _FEWEST and np.all(
-            inside.std(axis=0) < 3.0 * noise + _STILL * np.linalg.norm(inside.mean(axis=0))
-        ):
-            kept.append(rows)  # a perfect sensor's slowest motion is a rest for `detect_rest` too
-    return kept
-
-
-def _windows(
-    recording: Recording, readings: NDArray[np.float64], whole: NDArray[np.bool_], rests: Sequence[slice]
-) -> tuple[Window, ...]:
-    """Return the first stretch of motion, and the one in which the readings vary most."""
-    t, values = recording.t_s[whole], readings[whole]
-    group = max(1, int(recording.sample_rate // _RATE)) if recording.sample_rate < _NOMINAL_RATES[1] else 1
-    count = len(t) // group
-    if count < 2 * _FEWEST:
-        return ()
-    t = t[: count * group].reshape(count, group).mean(axis=1)
-    values = values[: count * group].reshape(count, group, -1).mean(axis=1)
-    length = min(_WINDOW, count)
-    starts = np.arange(0, count - length + 1, max(1, length // 4))
-    spread = [float(values[start : start + length].var(axis=0).sum()) for start in starts]
-    after_rest = 0
-    if rests:
-        last = int(np.count_nonzero(whole[: rests[0].stop])) // group
-        after_rest = max(0, min(last - _FEWEST, count - length))
-    passed = np.concatenate([[0], np.cumsum(whole)])
-    edges = np.array([[passed[rest.start], passed[rest.stop]] for rest in rests]).reshape(-1, 2) // group
-    chosen = dict.fromkeys([after_rest, int(starts[int(np.argmax(spread))])])
-    windows = []
-    for start in chosen:
-        part = slice(start, start + length)
-        still = _still(t[part], values[part], edges - start)
-        integrals = integrate_samples(t[part], values[part] - still, method="trapezoid")
-        rows = np.unique(np.linspace(0, length - 1, min(_ROWS, length)).astype(int))
-        windows.append(Window(values[part][rows], integrals[rows], t[part][rows] - t[start], 1.0 / group))
-    return tuple(windows)
-
-
-def _still(t: NDArray[np.float64], values: NDArray[np.float64], rests: NDArray[np.intp]) -> NDArray[np.float64]:
-    """Return what channels (m, c) read while α is zero, interpolated between the rests (k, 2) of a window.
-
-    A gain that is off by a tenth makes an α of gravity, another one in each pose, that would integrate to a rate. At
-    rest, and in a steady spin, α is zero; so what is read there is taken off, and what is wrong with it is fitted.
-    """
-    inside = np.clip(rests, 0, len(t))
-    inside = inside[inside[:, 1] - inside[:, 0] >= _FEWEST_STILL]
-    if not len(inside):
-        return np.zeros_like(values)
-    middles = [float(t[start:stop].mean()) for start, stop in inside]
-    means = np.array([values[start:stop].mean(axis=0) for start, stop in inside])
-    return np.column_stack([np.interp(t, middles, column) for column in means.T])
-
-
-def _quiet(readings: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the noise of each channel (c,) from second differences of its quietest tenth of samples, m/s²."""
-    size = 20
-    second = np.diff(readings, n=2, axis=0) / np.sqrt(6.0)
-    count = len(second) // size
-    if count < 1:
-        return np.zeros(readings.shape[1])
-    blocks = second[: count * size].reshape(count, size, -1)
-    rms = np.sqrt(np.mean(blocks**2, axis=1))  # NaN where a sample is missing
-    return np.nan_to_num(np.nanquantile(rms, 0.1, axis=0)) if np.isfinite(rms).any() else np.zeros(readings.shape[1])

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gfimu.files.model_files import list_models
 from gfimu.geometry.array import AccelerometerArray
@@ -114,7 +115,38 @@ def ways_to_read(evidence: Evidence) -> list[Otherwise]:
             chips = array.chips[one].name, array.chips[two].name
             text = f"chips {chips[0]} and {chips[1]} are exchanged; exchange the names of their columns"
             ways.append(Otherwise("exchange", text, identity[order], channels=chips))
-    return ways + _other_arrays(array)
+    return ways + _every_chip_alike(array) + _other_arrays(array)
+
+
+def _every_chip_alike(array: AccelerometerArray) -> list[Otherwise]:
+    """List two exchanged axes, and an inverted axis, of every chip alike: as a drawing or a driver may have them.
+
+    Some arrays have such a mirror image by two chips exchanged: the motion that fits is the mirrored one then.
+    """
+    if len(array.chips) < 2 or any(len(chip.axes) != 3 for chip in array.chips):
+        return []
+    ways = []
+    for one, two in combinations(range(3), 2):
+        order = np.arange(3)
+        order[[one, two]] = order[[two, one]]
+        brief = f"axes {one + 1} and {two + 1} of every chip"
+        text = f"{brief} are exchanged; exchange the names of their columns, or the axes in the array file"
+        columns = _on_every_chip(array, np.eye(3)[order])
+        ways.append(Otherwise("exchange", text, columns, channels=array.channels, brief=brief))
+    for axis in range(3):
+        sign = np.ones(3)
+        sign[axis] = -1.0
+        brief = f"axis {axis + 1} of every chip"
+        text = f"{brief} is inverted; change the sign of its columns, or of this axis in the array file"
+        columns = _on_every_chip(array, np.diag(sign))
+        names = tuple(chip.channels[axis] for chip in array.chips)
+        ways.append(Otherwise("sign", text, columns, channels=names, brief=brief))
+    return ways
+
+
+def _on_every_chip(array: AccelerometerArray, axes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the matrix (c, c) that maps the three axes of every chip alike by ``axes`` (3, 3)."""
+    return np.asarray(np.kron(np.eye(len(array.chips)), axes), dtype=np.float64)
 
 
 def _some_channels(array: AccelerometerArray) -> Iterator[tuple[str, tuple[str, ...]]]:

@@ -1,1 +1,1 @@
-"""When what a row holds was measured."""
+"""When what a row holds was measured: conversions of the chips, samples of the reference."""

@@ -1,7 +1,8 @@
-"""Plots on an HTML page that zoom: their data, packed, and the scripts that draw them without any network."""
+"""HTML pages: the style that all share, and plots that zoom, with their data, packed, and their scripts."""
 
 from gfimu.visual.page.content import page_plots
 from gfimu.visual.page.limits import PlotLimits
 from gfimu.visual.page.packed import Packed, enveloped
+from gfimu.visual.page.style import STILL_POLICY, page_basics, page_style
 
-__all__ = ["Packed", "PlotLimits", "enveloped", "page_plots"]
+__all__ = ["STILL_POLICY", "Packed", "PlotLimits", "enveloped", "page_basics", "page_plots", "page_style"]

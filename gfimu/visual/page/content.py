@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from gfimu.visual.page.packed import Packed
+from gfimu.visual.page.style import STILL_POLICY
 
 __all__ = ["page_plots"]
 
@@ -43,7 +44,7 @@ def page_plots(plots: Mapping[str, Any], data: Packed) -> Mapping[str, Any]:
         "licence": (_HERE / "uplot" / "LICENSE").read_text(encoding="utf-8"),
         "plots": text.replace("<", "\\u003c"),
         "data": data.text(),
-        "policy": f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src {hashes}",
+        "policy": f"{STILL_POLICY}; script-src {hashes}",
     }
 
 

@@ -72,11 +72,12 @@
 
   // ---------------------------------------------------------------- words and elements
 
-  // Three significant digits, with a true minus sign.
+  // Three significant digits, zeros at the end too, with a true minus sign.
   function numeral(value) {
     if (value === null || value === undefined || !Number.isFinite(value)) return "–";
     const size = Math.abs(value);
-    const text = size !== 0 && (size < 1e-3 || size >= 1e5) ? value.toExponential(2) : String(Number(value.toPrecision(3)));
+    const text = size !== 0 && (size < 1e-3 || size >= 1e5) ? value.toExponential(2)
+      : size === 0 ? "0" : size >= 100 ? value.toFixed(0) : value.toPrecision(3);
     return text.replace(/-/g, "−");
   }
 
@@ -103,6 +104,9 @@
   }
 
   const swatch = (colour) => element("i", { class: "swatch", style: `background: var(${colour})` });
+
+  // A piece of a line as it is drawn: full, dashed or dotted.
+  const lineSample = (colour, dash) => element("i", { class: "line", style: `border-top: 3px ${["solid", "dashed", "dotted"][dash % 3]} var(${colour})` });
 
   function colour(name) {
     return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
@@ -201,6 +205,12 @@
     const text = size !== 0 && (size < 1e-3 || size >= 1e5) ? value.toExponential(0) : String(Number(value.toPrecision(6)));
     return text.replace(/-/g, "−");
   };
+
+  // Of the ticks of a logarithmic axis those at 1, 2 and 5; its ends, where uPlot puts one too, are any number.
+  const roundTicks = (_, ticks) => ticks.map((one) => {
+    const first = one === null ? 0 : Number((one / 10 ** Math.floor(Math.log10(one) + 1e-9)).toPrecision(4));
+    return [1, 2, 5].includes(first) ? plainTick(one) : "";
+  });
 
   // A uPlot in `host`: dragged along x or y or both it zooms the view; ranges are given, never found by uPlot.
   function newPlot(host, view, { height, series, axes, data, key, logarithmic = [false, false], hooks = {}, focus = false }) {
@@ -468,7 +478,12 @@
         class: "pair", tabindex: "0", role: "group", "aria-roledescription": "plot",
         "aria-label": `Mean residual over ${spec.x.label}, before and after. ${KEYS} Arrows up and down choose the channel.`,
       });
-      host.append(element("div", { class: "toolbar" }, zoomButtons(this.view), this.readout), pair);
+      this.buttons = new Map(spec.strongest.map((channel) => {
+        const { name, chip, dash } = channels[channel];
+        return [channel, element("button", { type: "button", title: `choose ${name}`, onclick: () => this.choose(channel) }, lineSample(`--chip-${chip}`, dash), name)];
+      }));
+      host.append(element("div", { class: "toolbar" }, zoomButtons(this.view),
+        element("span", { class: "buttons", role: "group", "aria-label": "channels that follow it most" }, ...this.buttons.values()), this.readout), pair);
       listenToKeys(pair, this.view, (steps) => this.moveCursor(steps), (step) => {
         this.choose((this.chosen + step + channels.length) % channels.length);
       });
@@ -514,6 +529,7 @@
       if (channel === this.chosen && this.marked) return;
       this.marked = true;
       this.chosen = channel;
+      this.buttons.forEach((one, of) => one.setAttribute("aria-pressed", String(of === channel)));
       for (const plot of this.plots ?? []) {
         plot.series.forEach((series, k) => { if (k) series.width = k - 1 === channel ? 2.4 : 1.3; });
         plot.redraw(false);
@@ -541,7 +557,7 @@
       if (!this.plots || this.plots.length < 2) return;
       const { name, unit } = this.spec.x, plot = this.plots.find((one) => one.cursor.idx !== null && one.cursor.idx !== undefined);
       const at = plot ? plot.data[0][plot.cursor.idx] : null;
-      const words = [this.spec.channels[this.chosen].name];
+      const words = [];
       if (at !== null && at !== undefined) {
         const nearest = (line) => {
           const places = this.read("x", this.chosen), own = this.read(line, this.chosen);
@@ -551,9 +567,10 @@
           });
           return best === null ? null : own[best];
         };
-        words.push(`${name} = ${numeral(at)} ${unit}:`, `before ${numeral(nearest("before"))}, after ${numeral(nearest("after"))} ${this.spec.unit}`);
+        words.push(this.spec.channels[this.chosen].name, `${name} = ${numeral(at)} ${unit}:`, `before ${numeral(nearest("before"))}, after ${numeral(nearest("after"))} ${this.spec.unit}`);
       }
-      this.readout.replaceChildren(swatch(`--chip-${this.spec.channels[this.chosen].chip}`), words.join(" "));
+      const { chip, dash } = this.spec.channels[this.chosen];
+      this.readout.replaceChildren(...(words.length ? [lineSample(`--chip-${chip}`, dash), words.join(" ")] : []));
     }
   }
 
@@ -592,7 +609,7 @@
         height: 230, key, logarithmic: [spec.x.logarithmic, true],
         data: [this.x, this.lines.noise, this.lines.before, this.lines.after],
         series: [{}, style("noise", { dash: [6, 4] }), style("before"), style("after")],
-        axes: [axis(2, spec.x.label), axis(3, null)],
+        axes: [axis(2, spec.x.label, spec.x.logarithmic ? { values: roundTicks } : {}), axis(3, null, { values: roundTicks })],
         hooks: { setCursor: [() => this.say()] },
       });
       onWidth(box, (width) => this.plot.setSize({ width, height: this.plot.height }));

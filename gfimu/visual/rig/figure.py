@@ -15,11 +15,14 @@ from gfimu.geometry.array import AccelerometerArray
 from gfimu.geometry.turning_axis import TurningAxis
 from gfimu.visual.colours import AXES, INK, METAL, NOISE_ON_PAPER, SPIN_AXIS_ON_PAPER, STYLES, chip_colour, css
 from gfimu.visual.rig.package import Package, drawing_size, package_of
+from gfimu.visual.rig.words import short_name
 
 __all__ = ["array_figure", "channel_style"]
 
 _MM = 1000.0
-_MOST_CHANNEL_NAMES = 12
+_WIDTH = 5.5  # inches of one view
+_TITLES = {"side": "seen from the side", "above": "seen from above; ring: axis towards you, cross: away"}
+_MOST_CHANNEL_NAMES, _LONGEST_CHANNEL_NAME = 12, 10
 _ACROSS = 0.15  # an axis whose drawn length is below this share points at or away from the reader
 _NAME_AWAY = 0.19  # distance of a chip's name from it, in sizes of the drawing: 14 points on this paper
 _NAME_WEIGHT = 0.45
@@ -40,6 +43,7 @@ def array_figure(
     axis: TurningAxis | None = None,
     gravity: NDArray[np.float64] | None = None,
     gravity_name: str = "gravity",
+    views: Sequence[str] = ("side", "above"),
 ) -> Figure:
     """Draw an array in its body frame, seen obliquely and from above.
 
@@ -53,24 +57,24 @@ def array_figure(
         Direction of gravity in the body frame.
     gravity_name : str
         What its arrow is called.
+    views : sequence of {"side", "above"}
+        What is drawn, from left to right.
     """
-    figure = Figure(figsize=(11.0, 4.6), layout="constrained")
-    oblique, top = figure.subplots(1, 2)
+    figure = Figure(figsize=(_WIDTH * len(views), 4.6), layout="constrained")
     spin = array.turning_axis if axis is None else axis
-    for panel, view, title in (
-        (oblique, _OBLIQUE, "seen from the side"),
-        (top, _TOP, "seen from above; ring: axis towards you, cross: away"),
-    ):
-        _draw(panel, array, view, spin)
-        panel.set_title(title, loc="left", fontsize=10)
+    for panel, view in zip(figure.subplots(1, len(views), squeeze=False)[0], views, strict=True):
+        _draw(panel, array, _OBLIQUE if view == "side" else _TOP, spin)
+        panel.set_title(_TITLES[view], loc="left", fontsize=10)
         panel.set_aspect("equal", adjustable="datalim")
         panel.margins(0.17)
-    top.set_xlabel("body x, mm")
-    top.set_ylabel("body y, mm")
-    top.grid(color="0.93", linewidth=0.6)
-    top.set_axisbelow(True)
-    oblique.set_axis_off()
-    _triad(oblique, array, gravity, gravity_name)
+        if view == "side":
+            panel.set_axis_off()
+            _triad(panel, array, gravity, gravity_name)
+        else:
+            panel.set_xlabel("body x, mm")
+            panel.set_ylabel("body y, mm")
+            panel.grid(color="0.93", linewidth=0.6)
+            panel.set_axisbelow(True)
     most = max(len(chip.axes) for chip in array.chips)
     handles = [
         Line2D([], [], color=css(INK), linestyle=STYLES[number], label=f"sensing axis {number + 1} of a chip")
@@ -78,7 +82,7 @@ def array_figure(
     ]
     if spin is not None:
         handles.append(Line2D([], [], color=css(SPIN_AXIS_ON_PAPER), linestyle="-.", label="axis of rotation"))
-    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), fontsize=9, frameon=False)
+    figure.legend(handles=handles, loc="outside lower center", ncols=2 * len(views), fontsize=9, frameon=False)
     return figure
 
 
@@ -91,7 +95,7 @@ def _draw(panel: Axes, array: AccelerometerArray, view: NDArray[np.float64], spi
         panel.plot(*(np.array([start, end]) @ view.T * _MM).T, color=css(NOISE_ON_PAPER), linewidth=0.6)
     if spin is not None:
         _axis_line(panel, spin, package, view, size)
-    names_channels = array.n_channels <= _MOST_CHANNEL_NAMES
+    names_channels = array.n_channels <= _MOST_CHANNEL_NAMES and max(map(len, array.channels)) <= _LONGEST_CHANNEL_NAME
     for column, channel in enumerate(array.channels):
         _sensing_axis(panel, array, column, view, 0.42 * _axis_length(array, size), channel if names_channels else "")
     places = array.chip_positions @ view.T * _MM
@@ -104,7 +108,7 @@ def _draw(panel: Axes, array: AccelerometerArray, view: NDArray[np.float64], spi
     )
     drawn, room = [*arrows.reshape(-1, 2), *places], _NAME_AWAY * size * _MM
     named: list[NDArray[np.float64]] = []
-    for place, text in _same_places(places, [chip.name for chip in array.chips]):
+    for place, text in _same_places(places, [short_name(chip.name) for chip in array.chips]):
         direction = _free_direction(place, drawn, named, room)
         named.append(place + room * direction)
         panel.annotate(

@@ -8,13 +8,22 @@ from gfimu.geometry.array import AccelerometerArray
 from gfimu.visual.motion import KnownMotion
 from gfimu.visual.rig.package import Package, is_cube, package_of
 
-__all__ = ["array_words", "comparison_legend", "package_words", "run_legend", "scene_title"]
+__all__ = ["array_words", "comparison_legend", "package_words", "run_legend", "scene_title", "short_name"]
+
+_LONGEST_NAME = 14
 
 
 def scene_title(array: AccelerometerArray) -> str:
     """Return the title of a 3-D view: the array by name and size."""
     chips, channels = len(array.chips), array.n_channels
     return f"array {array.name}: {_count(chips, 'chip')}, {_count(channels, 'channel')}"
+
+
+def short_name(name: str) -> str:
+    """Return the name of a chip or channel for a drawing: the middle of a long one is left out."""
+    if len(name) <= _LONGEST_NAME:
+        return name
+    return f"{name[: _LONGEST_NAME - 5]}…{name[-4:]}"
 
 
 def package_words(package: Package) -> str:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from gfimu.errors import InputError
-from sim.benchmark.library import KnownDrive
+from sim.benchmark.library import KnownDrive, stated_parameters
 from sim.benchmark.truth_file import fixed_world
 from sim.benchmark.world import Task
 from sim.effects import EFFECTS, Effect, make_effect
@@ -33,9 +33,10 @@ def answer(task: Task) -> dict[str, Any]:
     places = np.flatnonzero(effect.size_values(task.twin.array))
     given = {key: {"value": value} for key, value in effect.parameters.items()}
     if len(places):
-        value, std = identify(task, effect, places)
-        sizes = [effect.sizes(task.twin.array)[place].key for place in places]
-        given |= {key: {"value": v, "std": s} for key, v, s in zip(sizes, value.tolist(), std.tolist(), strict=True)}
+        sizes, stds = np.zeros((2, len(effect.sizes(task.twin.array))))
+        sizes[places], stds[places] = identify(task, effect, places)
+        found = stated_parameters(type(effect), task.twin.array, sizes, np.diag(stds**2), effect.shape_values())
+        given |= {key: one for key, one in found.items() if "std" in one}
     return {"verdict": "explained", "causes": [{"effect": effect.name, "parameters": given}]}
 
 

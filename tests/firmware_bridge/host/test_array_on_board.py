@@ -21,7 +21,8 @@ from gfimu.commands.record import record
 from gfimu.errors import InputError, RecordingWarning
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
-from sim.scenarios import Scenario, simulate
+from sim.scenarios import Scenario
+from sim.simulation import simulate
 
 IDENTITY = bytes.fromhex("01 010300 6400 0a 0b 00c20100 0f 01 01 04 efbeadde 8813 0000")
 SECONDS = 20.0  # of the paper's run: a rest and two speeds

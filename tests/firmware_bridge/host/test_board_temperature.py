@@ -14,7 +14,8 @@ from gfimu import calibrate, check, inspect
 from gfimu.cli.check import print_check
 from gfimu.commands.record import record
 from gfimu.recording import Recording
-from sim.scenarios import Scenario, simulate
+from sim.scenarios import Scenario
+from sim.simulation import simulate
 
 LSB = 0.038245935
 SECONDS = 32.0

@@ -25,7 +25,8 @@ from gfimu.motion.estimation import estimate
 from gfimu.recording import Recording
 from sim.ride import Ride
 from sim.rigs.turntable import prescribed_readings
-from sim.scenarios import Scenario, simulate
+from sim.scenarios import Scenario
+from sim.simulation import simulate
 
 LSB = 0.038245935
 CHIPS = tuple(Adxl345Options(clock_error=0.004 * k - 0.006, phase=0.22 * k) for k in range(4))

@@ -6,7 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gfimu.calibration.result import Calibration, combine, load_calibration, parameter_names
+from gfimu.calibration.combine import combine
+from gfimu.calibration.parameter_names import parameter_names
+from gfimu.calibration.result import Calibration, load_calibration
 from gfimu.calibration.run_file import open_calibrated_run
 from gfimu.errors import InputError, UnitError
 from gfimu.geometry.array import AccelerometerArray

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from gfimu import AccelerometerArray, Recording
+from gfimu.calibration.parameter_names import parameter_names
 from gfimu.calibration.pictures import calibration_figure, pose_names
-from gfimu.calibration.result import Calibration, parameter_names
+from gfimu.calibration.result import Calibration
 from gfimu.geometry.array import Chip
 from gfimu.visual.colours import chip_colour, css
 

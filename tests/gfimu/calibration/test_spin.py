@@ -17,7 +17,8 @@ from gfimu.certification.certify import certify
 from gfimu.errors import InputError, UnitError
 from gfimu.recording import Recording
 from sim.chips.adxl345 import SensorErrors, SensorSettings
-from sim.scenarios import Scenario, simulate
+from sim.scenarios import Scenario
+from sim.simulation import simulate
 
 RATE = 100.0
 QUIET = SensorSettings(noise=False, quantisation=False, bandwidth=False)

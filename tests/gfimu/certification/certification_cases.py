@@ -4,7 +4,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from gfimu.calibration.error_model import ErrorModel
-from gfimu.calibration.result import Calibration, parameter_names, quadratic_names
+from gfimu.calibration.parameter_names import parameter_names, quadratic_names
+from gfimu.calibration.result import Calibration
 
 PARAMETERS = 15
 """Of one chip with a full matrix: nine of M, three of b, three of q."""

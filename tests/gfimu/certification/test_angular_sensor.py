@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from gfimu.calibration.result import Calibration, parameter_names
+from gfimu.calibration.parameter_names import parameter_names
+from gfimu.calibration.result import Calibration
 from gfimu.certification.angular import angular_sensor_sheet
 from gfimu.certification.angular.response import response
 from gfimu.certification.certificate import Term

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from certification_cases import calibration_of, random_covariance, random_model, random_rotation
 
-from gfimu.calibration.result import combine
+from gfimu.calibration.combine import combine
 from gfimu.certification.certificate import Certificate, Component, Sheet, Term
 from gfimu.certification.certify import certify
 from gfimu.certification.quantities import stated_quantities

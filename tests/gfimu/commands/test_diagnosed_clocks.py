@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 import gfimu
-from gfimu.diagnosis.verdict.verdict import Diagnosis, Gain, NamedCause, Residual, Unexplained
+from gfimu.diagnosis.criticism.gain import Gain
+from gfimu.diagnosis.verdict.parts import NamedCause, Residual, Unexplained
+from gfimu.diagnosis.verdict.verdict import Diagnosis
 from gfimu.joining import ReferenceSeries
 from sim.twin import Twin
 from sim.worlds.hidden import Measurement, measure

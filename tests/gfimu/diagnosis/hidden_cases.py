@@ -12,7 +12,7 @@ from gfimu.diagnosis import Diagnosis
 from sim.effects import EFFECTS
 from sim.study.cases import EXOTICS, Case, study_cases
 from sim.study.outcome import HiddenWorld, outcome_of
-from sim.study.report import score
+from sim.study.tally import score
 
 _GENERATORS = Path(__file__).resolve().parents[3] / "sim" / "benchmark" / "generators"
 SOURCES = {
@@ -93,8 +93,8 @@ _PAIRS = (
 def _singles() -> list[HiddenCase]:
     """Every effect once; generators and sizes in turn.
 
-    In so short a run of the campaign nothing reaches the clipping level and a mode is hardly rung, so these two are the
-    other generator's.
+    In so short a run of the campaign nothing reaches the clipping level and a mode is weakly excited, so these two are
+    the other generator's.
     """
     return [
         HiddenCase(

@@ -22,7 +22,7 @@ import numpy as np
 from hidden_cases import HiddenCase, hidden_cases
 
 from sim.study.outcome import run_case
-from sim.study.report import score, visible
+from sim.study.tally import score, visible
 from sim.sweep.executors import open_workers
 
 PINS = Path(__file__).with_name("hidden_cases.toml")

@@ -8,7 +8,8 @@ import numpy as np
 
 from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.criticism.views.run_view import RunView
-from gfimu.diagnosis.verdict.verdict import Diagnosis, NamedCause, Residual, Rival, Unexplained
+from gfimu.diagnosis.verdict.parts import NamedCause, Residual, Rival, Unexplained
+from gfimu.diagnosis.verdict.verdict import Diagnosis
 from sim.effects import Effect, make_effect
 from sim.twin import Twin
 from sim.worlds.hidden import Measurement, measure, random_profile

@@ -61,7 +61,7 @@ def test_by_the_usual_effects_it_is_no_curve_of_twelve_channels():
     assert found.verdict == "unknown"
     assert "go as the centripetal arm" in found.unexplained.signature
     assert not found.causes
-    # What describes it then is the reference's, and predicts data that its fit never saw.
+    # What describes it then is the reference's, and predicts validation data.
     assert found.gain.share_of_excess_removed == pytest.approx(1.0, abs=0.1)
 
 

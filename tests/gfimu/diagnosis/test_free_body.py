@@ -18,7 +18,8 @@ from gfimu.files.model_files import find_model, read_toml
 from gfimu.motion.attitude import to_rotation
 from gfimu.motion.body_drive import BodyDrive
 from sim.effects import BODY_EFFECTS, EFFECTS, NOT_OF_A_BODY
-from sim.scenarios import Scenario, simulate
+from sim.scenarios import Scenario
+from sim.simulation import simulate
 from sim.twin import Twin
 
 TUMBLE = read_toml(find_model("scenarios", "tumble"))

@@ -17,7 +17,7 @@ from gfimu.diagnosis import diagnose
 from sim.effects import EFFECTS
 from sim.study.cases import EXOTICS, Case, study_cases
 from sim.study.outcome import draw_world, run_case
-from sim.study.report import score, visible
+from sim.study.tally import score, visible
 from sim.twin import Twin
 
 PINNED = Pins.load()

@@ -169,7 +169,7 @@ def test_names_that_predict_no_held_out_data_are_withdrawn_whatever_the_residual
     residuals_unjudged(monkeypatch)
     outcome = diagnosed(hidden, world, having(world.twin, *NEAREST["clock_error"]))
     assert outcome["verdict"] == "unknown"
-    assert "do not predict data the fit never saw" in outcome["signature"]
+    assert "do not predict validation data" in outcome["signature"]
 
 
 _BESIDE = ("eccentricity", "scale_factor", "table_tilt")

@@ -14,7 +14,7 @@ from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.report.page import report_html
 from gfimu.diagnosis.report.plain_words import headline
 from gfimu.diagnosis.verdict.naming import capped
-from gfimu.diagnosis.verdict.verdict import NamedCause
+from gfimu.diagnosis.verdict.parts import NamedCause
 from gfimu.diagnosis.verdict.wording import verdict_sentences
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
@@ -62,8 +62,8 @@ def test_causes_that_explain_in_part_say_so_everywhere():
     assert "in part" not in headline(whole)
     assert "Verdict: Explained in part" in report_html(part)
     told = verdict_sentences("explained", part.causes, part.residual, part.gain, part.unexplained, ())
-    assert told[0].startswith("The simulation is wrong in part because of table_tilt: 67% of the excess is gone")
-    assert any("so much more than on unseen data" in sentence for sentence in told)
+    assert told[0].startswith("The simulation is wrong in part because of table_tilt: 67 % of the excess is gone")
+    assert any("so much more than on validation data" in sentence for sentence in told)
 
 
 def test_a_verdict_that_does_not_predict_unseen_data_is_unknown():
@@ -72,7 +72,7 @@ def test_a_verdict_that_does_not_predict_unseen_data_is_unknown():
     world = draw_world(case)
     found = diagnose([world.recording], world.twin)
     assert (found.verdict, found.causes) == ("unknown", ())
-    assert "the causes found (scale_factor) do not predict data the fit never saw: " in found.unexplained.signature
+    assert "the causes found (scale_factor) do not predict validation data: " in found.unexplained.signature
     assert not any(effect.name == "scale_factor" for effect in found.twin.effects)
 
 

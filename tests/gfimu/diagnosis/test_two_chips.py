@@ -20,7 +20,7 @@ from gfimu.diagnosis.terms.hand.learning import first_noise
 from gfimu.diagnosis.terms.hand.noise import Projection
 from gfimu.diagnosis.terms.hand.posterior import condition_hand
 from gfimu.diagnosis.verdict.gate import impossible_sizes, judge
-from gfimu.diagnosis.verdict.verdict import NamedCause, Residual
+from gfimu.diagnosis.verdict.parts import NamedCause, Residual
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray, Chip
 from gfimu.motion.body_drive import BodyDrive
@@ -96,7 +96,7 @@ def test_what_stays_open_is_listed_in_the_verdict_and_in_one_sentence():
             (effect, {key: round(weight, 1) for key, weight in sorted(one.items())}) for effect, one in combinations
         ]
     (sentence,) = [one for one in found.sentences if "can't determine" in one]
-    assert f"{len(text)} combinations, which stay at zero with the ± of what is usual" in sentence
+    assert f"{len(text)} combinations, which stay at zero with the standard deviation of their prior" in sentence
 
 
 def test_an_open_combination_has_the_spread_of_its_prior():

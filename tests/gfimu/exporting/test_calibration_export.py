@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 import gfimu
-from gfimu.calibration.result import Calibration, parameter_names
+from gfimu.calibration.parameter_names import parameter_names
+from gfimu.calibration.result import Calibration
 from gfimu.errors import InputError
 from gfimu.exporting.calibrated_chip import calibrated_chips, number
 from gfimu.exporting.kalibr import lower_form

@@ -9,7 +9,7 @@ import pytest
 
 from gfimu import AccelerometerArray, InputError, Recording, SensorErrors, estimate, estimate_rate, open_recording
 from gfimu.errors import CorruptValueWarning, GfimuError, UnitError
-from gfimu.motion.estimation import Estimate
+from gfimu.motion.estimate import Estimate
 from gfimu.recording.formats import open_run
 from gfimu.units import STANDARD_GRAVITY
 

@@ -8,6 +8,7 @@ import foreign_files as files
 import numpy as np
 import pytest
 
+import gfimu
 from gfimu.errors import InputError, RecordingWarning, UnitError
 from gfimu.importing import inspect_file, load_map
 from gfimu.importing.oddities import oddities
@@ -170,7 +171,6 @@ def test_units_are_read_as_people_write_them():
 
 
 def test_a_recording_of_gfimus_is_known_and_its_repeated_rows_are_said(tmp_path):
-    import gfimu
 
     rows = [f"{k / 100},{k % 5},{k % 3},{9.8 + 0.01 * (k % 4)},{k}" for k in range(300)]
     path = tmp_path / "run.csv"

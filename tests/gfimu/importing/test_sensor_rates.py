@@ -11,7 +11,7 @@ from gfimu import InputError
 from gfimu.errors import RecordingWarning
 from gfimu.importing import load_map
 from gfimu.importing.piece import nearest_rows
-from gfimu.recording.reference_times import reference_on_rows, reference_series
+from gfimu.recording.timing.reference_times import reference_on_rows, reference_series
 
 ACCEL = np.arange(0.0, 10.0, 0.01)
 GYRO = np.arange(0.003, 10.0, 0.02)

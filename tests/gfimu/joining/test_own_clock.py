@@ -10,7 +10,8 @@ import pytest
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.joining import displaced_reference
 from sim.effects import make_effect
-from sim.scenarios import Scenario, simulate
+from sim.scenarios import Scenario
+from sim.simulation import simulate
 from sim.twin import Twin
 from sim.worlds.hidden import Measurement, measure
 

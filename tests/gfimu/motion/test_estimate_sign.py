@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from gfimu import AccelerometerArray, Recording, specific_force, summarise
-from gfimu.motion.estimation import Estimate, estimate
+from gfimu.motion.estimate import Estimate
+from gfimu.motion.estimation import estimate
 from gfimu.parts.limits import PartLimits
 from gfimu.visual.run_plots import free_rate_plots
 

@@ -9,7 +9,7 @@ import gfimu
 from gfimu.errors import InputError
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.integrity.fault import HealthCode
-from gfimu.motion.estimation import Estimate
+from gfimu.motion.estimate import Estimate
 
 
 @pytest.fixture(scope="module")

@@ -126,8 +126,8 @@ def test_noise_and_walk_laws_at_rest(cube):
     np.testing.assert_allclose(std["noise of p"], np.sqrt(s_p * t**3 / 3))
     np.testing.assert_allclose(std["noise of alpha"], [G * np.sqrt(s_alpha * t**7 / 252)] * 2 + [0])
     k_p, k_alpha = k / 2, k / (np.sqrt(8) * h)
-    np.testing.assert_allclose(std["walk of the bias of p"], k_p * np.sqrt(t**5 / 20))
-    np.testing.assert_allclose(std["walk of the bias of alpha"], [G * k_alpha * np.sqrt(t**9 / 5184)] * 2 + [0])
+    np.testing.assert_allclose(std["bias random walk of p"], k_p * np.sqrt(t**5 / 20))
+    np.testing.assert_allclose(std["bias random walk of alpha"], [G * k_alpha * np.sqrt(t**9 / 5184)] * 2 + [0])
     assert std["noise of alpha"][0] == pytest.approx(4.0, abs=0.15)
 
 

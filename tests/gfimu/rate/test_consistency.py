@@ -13,7 +13,8 @@ from gfimu.parts.limits import PartLimits
 from gfimu.rate.consistency import FALSE_ALARM, _slow_quantile, judge_consistency, slow_error_signatures
 from gfimu.rate.filter import filter_rate
 from gfimu.units import STANDARD_GRAVITY
-from sim.scenarios import Scenario, simulate
+from sim.scenarios import Scenario
+from sim.simulation import simulate
 
 CUBE = AccelerometerArray.load("cube12")
 RATE = 100.0

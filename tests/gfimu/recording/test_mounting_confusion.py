@@ -10,7 +10,8 @@ import pytest
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording.checks import check_recording
 from gfimu.units import STANDARD_GRAVITY
-from sim.scenarios import Scenario, simulate
+from sim.scenarios import Scenario
+from sim.simulation import simulate
 
 ARRAYS = {name: AccelerometerArray.load(name) for name in ("cube12", "cube12_as_built")}
 

@@ -16,7 +16,8 @@ from gfimu.recording.checks import check_recording, refuse_or_warn
 from gfimu.recording.formats import open_run
 from gfimu.units import STANDARD_GRAVITY
 from sim.benchmark.generators.independent_world import hide
-from sim.scenarios import Scenario, simulate
+from sim.scenarios import Scenario
+from sim.simulation import simulate
 
 CUBE = AccelerometerArray.load("cube12")
 RATE = 100.0
@@ -315,3 +316,21 @@ def test_a_rest_bias_beyond_the_data_sheet_is_refused(table_run):
     ):
         estimate_from_rest(wrong, CUBE)
     assert "a22" in estimate_from_rest(wrong, CUBE, force=True).metadata["warnings"][0]
+
+
+@pytest.mark.parametrize(("one", "two"), [(0, 1), (0, 2)])
+def test_two_axes_exchanged_on_every_chip_are_named_by_the_tachometer(table_run, one, two):
+    """The cube's mirror image is itself with two chips exchanged: only the sign of the turning tells."""
+    order = np.arange(12).reshape(4, 3)
+    order[:, [one, two]] = order[:, [two, one]]
+    rate = np.interp(
+        table_run.t_s, [0, 3, 4, 8, 9, 13, 14.5, 16, 17, 21, 22.5, 24], [0, 0, 2, 2, 4, 4, 0, 0, -3, -3, 0, 0]
+    )
+    run = replace(table_run, reference={"tacho_rad_s": rate})
+    assert check_recording(run, CUBE) == ()
+    (found,) = check_recording(replace(run, readings=run.readings[:, order.ravel()]), CUBE)
+    assert (found.kind, found.refused) == ("exchange", True)
+    assert f"axes {one + 1} and {two + 1} of every chip are exchanged" in found.text
+    pair = [3 * chip + axis for chip in ({1: (1, 2), 2: (1, 3)}[two]) for axis in range(3)]
+    (found,) = check_recording(with_columns(run, exchanged(pair, pair[3:] + pair[:3])), CUBE)
+    assert found.text.startswith(f"chips a2 and a{two + 2} are exchanged")

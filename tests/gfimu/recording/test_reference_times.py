@@ -14,7 +14,7 @@ from gfimu.diagnosis.policy import Policy
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.joining import ReferenceSeries, join_reference
 from gfimu.recording import Recording
-from gfimu.recording.reference_times import reference_on_rows, reference_series
+from gfimu.recording.timing.reference_times import reference_on_rows, reference_series
 from sim.twin import Twin
 
 TWIN = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")

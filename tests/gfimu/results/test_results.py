@@ -1,6 +1,8 @@
 """What every result offers a notebook: HTML, tables, pictures, rerun; by one mechanism."""
 
+import dataclasses
 import sys
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
@@ -9,7 +11,7 @@ import pytest
 
 import gfimu
 from gfimu.errors import GfimuError
-from gfimu.motion.estimation import Estimate
+from gfimu.motion.estimate import Estimate
 from gfimu.results import Panel, PlottedResult, Series, TableResult, result_html, text_column
 from gfimu.results.figure import drawn
 from gfimu.results.html import MOST_ROWS
@@ -133,6 +135,17 @@ def test_uncertainty_is_a_band_of_two_standard_deviations():
     assert [text.get_text() for text in axes.get_legend().get_texts()] == ["x ± 2σ", "y ± 2σ", "z ± 2σ"]
 
 
+def test_dollar_signs_in_names_are_no_formula(tmp_path):
+    values = np.zeros(2)
+    named = Panel("of $\\frac$", "$y_$", (Series("$a_$", values), Series("b", values)), ("$c_$", "$"), "$x_$")
+    lines = Panel("$t_$", "y", (Series("$s_$", values), Series("b", values)), np.arange(2.0))
+    figure = drawn([named, lines])
+    figure.savefig(tmp_path / "named.svg", metadata={"Date": None})
+    cube = gfimu.AccelerometerArray.load("cube12")
+    renamed = replace(cube, name="$n_$", chips=tuple(replace(one, name=f"${one.name}_$") for one in cube.chips))
+    renamed.plot().savefig(tmp_path / "chips.svg")
+
+
 def test_bars_over_names_are_of_two_standard_deviations():
     panel = Panel("biases", "bias, m/s²", (Series("", np.array([1.0, 2.0]), np.array([0.1, 0.2])),), ("a11", "a12"))
     (axes,) = drawn([panel]).axes
@@ -239,3 +252,16 @@ def test_a_result_logs_to_a_stream_of_the_caller(results):
     stream.disconnect()
     assert b"rateestimate/angular_rate" in data
     assert b"mine/facts" in data
+
+
+def test_a_name_with_dollar_signs_is_drawn_as_it_is():
+    """Matplotlib reads what stands between two of them as a formula, and refuses some."""
+    name = "left $^$"
+    chip = gfimu.AccelerometerArray.load("one_chip").chips[0]
+    array = gfimu.AccelerometerArray("$_$", (dataclasses.replace(chip, name=name),))
+    array.plot().canvas.draw()
+    over_names = Panel("$_$", "m/s²", (Series(name, np.ones(2)),), (name, "a2"))
+    over_time = Panel("t", "$^$", (Series(name, np.ones(3)),), np.arange(3.0))
+    figure = drawn([over_names, over_time])
+    figure.canvas.draw()
+    assert figure.axes[0].get_xticklabels()[0].get_text() == r"left \$^\$"

@@ -8,7 +8,8 @@ from functools import cache
 import numpy as np
 
 from gfimu.geometry.array import AccelerometerArray
-from gfimu.motion.estimation import Estimate, estimate
+from gfimu.motion.estimate import Estimate
+from gfimu.motion.estimation import estimate
 from gfimu.tolerances.calibrated import Poses
 from gfimu.tolerances.known_motion import KnownMotion
 from gfimu.tolerances.tolerances import ChipErrors, Tolerances

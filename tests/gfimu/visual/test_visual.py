@@ -11,6 +11,7 @@ import pyarrow as pa
 import pytest
 from numpy.testing import assert_allclose
 from rerun.chunk import RrdReader
+from rerun_layout import Layout
 from scipy.spatial.transform import Rotation
 
 import gfimu
@@ -417,3 +418,15 @@ def test_many_chips_are_plotted_in_groups_that_a_legend_can_name(tmp_path):
         c["labels"] for n, c in found.items() if n.startswith("/scene/array/") and "c31_" in str(c.get("labels"))
     )
     assert len(names) >= 1
+
+
+def test_the_picture_of_a_pendulum_has_its_arm_and_no_table(tmp_path):
+    """Its axis is in the recording's metadata, not in the array file; a table's recording has none."""
+    hung = gfimu.simulate("pendulum", changes=["sensor.errors=false"])
+    assert hung.metadata["rig_axis"]["inclination_rad"] == pytest.approx(np.pi / 2)
+    np.testing.assert_allclose(hung.metadata["rig_axis"]["point_m"], [0.0, 0.4, 0.0], atol=1e-12)
+    assert "rig_axis" not in gfimu.simulate("rest").metadata
+    gfimu.view(hung, out=tmp_path / "hung.rrd")
+    drawn = Layout.read(tmp_path / "hung.rrd").data
+    assert any("/cube" in name for name in drawn)
+    assert not any("/table" in name or "/base" in name for name in drawn)

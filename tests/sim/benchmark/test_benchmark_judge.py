@@ -160,6 +160,21 @@ def test_absurd_sizes_remove_nothing():
     assert found.removed == -1.0
 
 
+def test_a_parameter_of_a_channel_that_the_array_lacks_is_refused():
+    """It would change nothing, so that a wrong size would pass for none."""
+    wrong = CauseAnswer("bias", {"a11_m_s2": ParameterAnswer(0.1, 0.01), "a99_m_s2": ParameterAnswer(0.1, 0.01)})
+    with pytest.raises(InputError, match="independent/dev/000: effect 'bias': unknown parameter 'a99_m_s2'"):
+        judge([Answer("independent/dev/000", "explained", [wrong])])
+    second = CauseAnswer("misalignment", {"a7_x_rad": ParameterAnswer(0.1, 0.01)})
+    with pytest.raises(InputError, match="unknown parameter 'a7_x_rad'"):  # also where it is one of a set
+        judge([Answer("independent/dev/000", "ambiguous", [*tilt(1e-3, 0.0, 1e-4).causes, second])])
+
+
+def test_a_description_without_a_name_may_have_any_parameter():
+    described = CauseAnswer("unlisted", {"a99_m_s2": ParameterAnswer(0.1)}, place="chip")
+    assert judge([Answer("independent/dev/000", "unknown", [described])])[0].outcome == "wrong"
+
+
 def test_unknown_worlds_and_wrong_answers_are_refused():
     with pytest.raises(InputError, match="no world 'own/test/999'"):
         judge([Answer("own/test/999", "unknown")])

@@ -12,9 +12,10 @@ from sim.benchmark.answer import answer_of, read_answers
 from sim.benchmark.baselines import BASELINES
 from sim.benchmark.baselines.best_single import _log_tail
 from sim.benchmark.judge import judge
-from sim.benchmark.library import LinearLibrary
+from sim.benchmark.library import LinearLibrary, stated_parameters
 from sim.benchmark.methods import answer_task, load_method
 from sim.benchmark.truth_file import fixed_world, task_of, truths
+from sim.effects import EFFECTS
 
 FOLDER = Path(baselines.__file__).parent
 
@@ -56,6 +57,31 @@ def test_the_library_explains_what_it_made():
     true = dict(truth.hidden)["table_tilt"]
     for key in ("x_rad", "y_rad"):
         assert cause["parameters"][key]["value"] == pytest.approx(true[key], abs=6 * cause["parameters"][key]["std"])
+
+
+def test_sizes_become_the_parameters_of_an_answer():
+    twin = task_of(the_world("table_tilt")).twin
+    tone, shape = EFFECTS["interference_tone"], {"frequency_hz": 21.0}
+    covariance = np.array([[4e-4, 1e-4], [1e-4, 1e-4]])
+    sizes = np.array([-0.3, 0.4])
+    found = stated_parameters(tone, twin.array, sizes, covariance, shape)
+    drawn = np.random.default_rng(0).multivariate_normal(sizes, covariance, 20_000)
+    assert found["amplitude_m_s2"]["value"] == pytest.approx(0.5)
+    assert found["amplitude_m_s2"]["std"] == pytest.approx(np.hypot(*drawn.T).std(), rel=0.03)
+    assert found["phase_rad"]["value"] == pytest.approx(np.arctan2(0.4, -0.3))
+    assert found["phase_rad"]["std"] == pytest.approx(np.arctan2(drawn[:, 1], drawn[:, 0]).std(), rel=0.03)
+    assert found["frequency_hz"] == {"value": 21.0}
+    # Near the cut of the phase a step may jump by a turn.
+    cut = stated_parameters(tone, twin.array, np.array([-0.5, 1e-9]), np.diag([1e-4, 1e-4]), shape)
+    assert cut["phase_rad"]["std"] == pytest.approx(0.02, rel=1e-3)
+
+
+@pytest.mark.parametrize("name", ["best_single", "oracle"])
+def test_baselines_predict_a_tone(name):
+    world = the_world("interference_tone")
+    (found,) = judge([answer_task(load_method(BASELINES[name]), task_of(world))])
+    assert found.outcome == "alone"
+    assert found.z  # amplitude, phase
 
 
 def test_an_exception_or_a_wrong_answer_is_an_error_of_that_world():

@@ -11,7 +11,8 @@ from gfimu.parts.part import white_noise_std
 from sim.chips.adxl345 import Sensor, SensorSettings
 from sim.chips.conversions import conversion_groups
 from sim.ride import Ride
-from sim.scenarios import Scenario, simulate
+from sim.scenarios import Scenario
+from sim.simulation import simulate
 from sim.twin import Twin
 
 CUBE = AccelerometerArray.load("cube12")

@@ -18,7 +18,8 @@ from sim.effects.description import describe
 from sim.effects.mounting import RailTilt
 from sim.effects.unknown import Unknown
 from sim.motions.motion import SpinState
-from sim.scenarios import Scenario, simulate
+from sim.scenarios import Scenario
+from sim.simulation import simulate
 from sim.twin import Twin
 from sim.world import World
 

@@ -7,7 +7,7 @@ import pytest
 
 from gfimu import AccelerometerArray
 from gfimu.diagnosis.report.plain_words import parameter_texts
-from gfimu.diagnosis.verdict.verdict import NamedCause
+from gfimu.diagnosis.verdict.parts import NamedCause
 from gfimu.units import KEY_ENDINGS, NAME, NUMBER, RATIO, key_name
 from sim.effects import BODY_EFFECTS, EFFECTS
 from sim.effects.base import Size

@@ -6,7 +6,8 @@ from scipy.spatial.transform import Rotation
 
 from gfimu.errors import InputError
 from sim.motions.pose_sequence import POSE_SETS, PoseSequence
-from sim.scenarios import Scenario, simulate
+from sim.scenarios import Scenario
+from sim.simulation import simulate
 
 
 @pytest.mark.parametrize("poses", POSE_SETS)

@@ -11,7 +11,8 @@ from sim.study.__main__ import main
 from sim.study.cases import Case
 from sim.study.outcome import draw_world
 from sim.study.outcome_file import read_outcomes
-from sim.study.report import rate_with_interval, reliability, score, summarise, write_report
+from sim.study.report import reliability, summarise, write_report
+from sim.study.tally import rate_with_interval, score
 
 
 def outcome(effects=(), causes=(), verdict="nothing_found", **more):
@@ -88,7 +89,7 @@ def test_an_effect_taken_out_is_as_far_from_the_rest_as_it_is_unlike_it(name, le
         for row in summarise([outcome([name], study="left_out", without=name, left_by=world.left_by)]).splitlines()
         if row.startswith("| **taken out")
     )
-    assert ("imitated by one other effect" in line) == (most < 15.0)
+    assert ("confounded with one other effect" in line) == (most < 15.0)
 
 
 def test_the_report_keeps_what_was_written_by_hand(tmp_path):

@@ -9,7 +9,7 @@ import pytest
 
 from sim.study.__main__ import main
 from sim.study.compare import POLICY, compare, load_outcomes
-from sim.study.report import score
+from sim.study.tally import score
 
 
 def outcome(number, effects=("bias",), names=None, verdict=None, study="singles", **more):

@@ -3,11 +3,14 @@
 import numpy as np
 import pyarrow as pa
 import pytest
+from matplotlib.figure import Figure
 
 from gfimu.errors import InputError
 from sim.sweep.design import Design
-from sim.sweep.picture import campaign_picture, label
+from sim.sweep.panels import draw_over, label
+from sim.sweep.picture import campaign_picture
 from sim.sweep.plan import load_plan
+from sim.sweep.summary import numbers
 
 PLAN = """
 design = "random"
@@ -75,6 +78,20 @@ def test_every_factor_has_a_panel_and_every_result_a_row(drawn):
     for text in ("mine: 60 of 60 cases", "filter", "smoother", *names):
         assert text in shown, text
     assert any("10^{-2}" in text for text in shown)  # the range is logarithmic
+
+
+def test_the_name_of_an_axis_leaves_room_for_its_power_of_ten(tmp_path):
+    (tmp_path / "plan.toml").write_text('design = "random"\npoints = 8\n[factors.a_m]\nlow = 0\nhigh = 1e-3\n'
+                                        "[factors.b_m]\nlow = 0\nhigh = 1.0\n")  # fmt: skip
+    design = Design(load_plan(tmp_path / "plan.toml"))
+    cases = [design[number] for number in range(len(design))]
+    table = pa.Table.from_pylist([{"case": case.number, **case.values, "y_m": 1.0 + case.number} for case in cases])
+    small, large = Figure().subplots(1, 2)
+    for axes, name in ((small, "a_m"), (large, "b_m")):
+        draw_over(axes, table, design, name, numbers(table, "y_m"), truth=False)
+    assert small.xaxis.label.get_horizontalalignment() == "left"
+    assert large.xaxis.label.get_horizontalalignment() == "center"
+    assert (small.get_xlabel(), large.get_xlabel()) == ("a (m)", "b (m)")
 
 
 def test_what_is_not_drawn_is_said(drawn):

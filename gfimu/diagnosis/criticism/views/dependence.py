@@ -71,8 +71,8 @@ class Dependence:
         Bins of the quantity.
     before, after : ndarray, shape (b, c)
         Mean residual per bin and channel, m/s²; NaN in bins with too few samples.
-    amplitude_before, amplitude_after : ndarray, shape (c,)
-        Rms of the part of the residual that follows the quantity, m/s².
+    amplitude_before : ndarray, shape (c,)
+        Rms of the part of the residual before that follows the quantity, m/s².
     share_before : ndarray, shape (c,)
         Share of the residual beyond noise that it is, 0 to 1.
     p_before, p_after : ndarray, shape (c,)
@@ -91,7 +91,6 @@ class Dependence:
     before: NDArray[np.float64]
     after: NDArray[np.float64]
     amplitude_before: NDArray[np.float64]
-    amplitude_after: NDArray[np.float64]
     share_before: NDArray[np.float64]
     p_before: NDArray[np.float64]
     p_after: NDArray[np.float64]
@@ -189,7 +188,6 @@ def dependences(
                 mean_before,
                 mean_after,
                 old.amplitude,
-                new.amplitude,
                 old.share,
                 old.p_value,
                 new.p_value,
@@ -341,7 +339,7 @@ def _sentence(quantity: Quantity, channels: Sequence[str], old: _Regression, new
         return (
             f"Before, the residual follows {quantity.name} in {listed(names)} "
             f"({old.amplitude[top]:.2g} m/s² rms in {channels[top]}, "
-            f"{old.share[top]:.0%} of what is beyond noise there); {after or 'after: gone'}."
+            f"{100 * old.share[top]:.0f} % of what is beyond noise there); {after or 'after: gone'}."
         )
     if after:
         return f"The residual follows {quantity.name}; {after}."

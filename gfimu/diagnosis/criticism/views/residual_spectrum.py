@@ -232,7 +232,7 @@ def _sentence(form: str, what: str, channels: Sequence[str], lines: Sequence[Spe
         where = "all channels" if len(names) == len(channels) else listed(names)
         left = _left(form, after)
         return (
-            f"Before, the residual has {what}, strongest at {form.format(before.place)} "
+            f"Before, the residual has {what}, strongest at {_placed(form, before)} "
             f"(amplitude up to {before.amplitude.max():.2g} m/s², in {where}); {left or 'after: gone'}."
         )
     if after is not None and after.significant:
@@ -243,4 +243,9 @@ def _sentence(form: str, what: str, channels: Sequence[str], lines: Sequence[Spe
 def _left(form: str, after: SpectralLine | None) -> str:
     if after is None or not after.significant:
         return ""
-    return f"after: {after.amplitude.max():.2g} m/s² left at {form.format(after.place)}"
+    return f"after: {after.amplitude.max():.2g} m/s² left at {_placed(form, after)}"
+
+
+def _placed(form: str, line: SpectralLine) -> str:
+    text = form.format(line.place)
+    return text.replace("cycles", "cycle") if text.startswith("1 ") else text

@@ -35,14 +35,10 @@ class ResidualSize:
 
 @dataclass(frozen=True)
 class Whiteness:
-    """Whether the residual is noise: two tests per channel.
+    """Whether the residual is noise, by the first 20 correlations and the cumulative periodogram of each channel.
 
     Parameters
     ----------
-    ljung_box_before, ljung_box_after : ndarray, shape (c,)
-        p-values of the first 20 correlations.
-    periodogram_before, periodogram_after : ndarray, shape (c,)
-        p-values of the cumulative periodogram.
     frequency : ndarray, shape (m,)
         Frequencies of the cumulative periodograms, Hz.
     cumulative_before, cumulative_after : ndarray, shape (m, c)
@@ -53,10 +49,6 @@ class Whiteness:
         What matters, or empty.
     """
 
-    ljung_box_before: NDArray[np.float64]
-    ljung_box_after: NDArray[np.float64]
-    periodogram_before: NDArray[np.float64]
-    periodogram_after: NDArray[np.float64]
     frequency: NDArray[np.float64]
     cumulative_before: NDArray[np.float64]
     cumulative_after: NDArray[np.float64]
@@ -201,6 +193,4 @@ def _whiteness(
             parts.append("after: it is")
         sentence = "; ".join(parts) + "."
         sentence = sentence[0].upper() + sentence[1:]
-    return Whiteness(
-        old_p, new_p, old_periodogram, new_periodogram, frequency, old_cumulative, new_cumulative, looks, sentence
-    )
+    return Whiteness(frequency, old_cumulative, new_cumulative, looks, sentence)

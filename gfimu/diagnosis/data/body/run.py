@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation, binary_erosion, uniform_filter1d
 
 from gfimu.diagnosis.data.body.gyro import SmoothGyro, smooth_gyro
-from gfimu.diagnosis.data.run import GYRO_COLUMNS, Run, possible_values, prepare_run
+from gfimu.diagnosis.data.reference import GYRO_COLUMNS
+from gfimu.diagnosis.data.run import Run, possible_values, prepare_run
 from gfimu.diagnosis.data.time_grid import time_grid
 from gfimu.recording import Recording
 from gfimu.world_model import WorldModel

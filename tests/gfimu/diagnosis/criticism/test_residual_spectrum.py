@@ -54,6 +54,11 @@ def test_a_ripple_of_the_angle_is_one_order_though_the_rate_swings():
     assert in_time.line_before is None or not in_time.line_before.significant  # smeared over frequencies
 
 
+def test_one_order_is_one_cycle():
+    _, in_angle = spectra(on_first(0.05 * np.cos(ANGLE)))
+    assert "strongest at 1 cycle per revolution" in in_angle.sentence
+
+
 def test_a_table_at_rest_adds_nothing_to_an_order():
     rate = np.where(np.arange(N) < N // 2, RATE, 0.0)
     angle = np.cumsum(rate) * PERIOD

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from made_runs import made_run
 
-from gfimu.diagnosis.data.rails import Rail, find_rails, on_rails, rail_parameters, rail_sentence
+from gfimu.diagnosis.data.faults.rails import Rail, find_rails, on_rails, rail_parameters, rail_sentence
 
 STEP, SIGMA, LEVEL = 0.04, 0.05, 20.0 * 0.04 * 12  # m/s²; the level is a whole count
 N = 2000

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from made_runs import PERIOD, made_run, without
 
-from gfimu.diagnosis.data.samples import channel_spikes, frozen_stretches, reference_spikes, told_frozen
+from gfimu.diagnosis.data.samples import channel_spikes, frozen_fault, frozen_stretches, reference_spikes
 
 N, SIGMA, STEP = 1000, 0.05, 0.04
 T = PERIOD * np.arange(N)
@@ -67,7 +67,7 @@ def test_a_channel_that_holds_one_value_while_it_should_move():
     assert channel == 0
     assert abs(start - 200) <= 1
     assert abs(stop - 500) <= 1
-    parameters, text = told_frozen(made_run(readings), [(channel, start, stop)], ["a11", "a12"])
+    parameters, text = frozen_fault(made_run(readings), [(channel, start, stop)], ["a11", "a12"])
     assert parameters["channel"] == "a11"
     assert parameters["start_s"] == pytest.approx(2.0, abs=PERIOD)
     assert text == f"channel a11 holds one value from {T[start]:.2f} s to {T[stop]:.2f} s"

@@ -79,7 +79,7 @@ def css(colour):
 def test_plots_stand_in_place_of_the_pictures(page):
     assert page.run("document.querySelectorAll('.zooming canvas').length") >= 15
     assert page.run("[...document.querySelectorAll('.still')].every(one => !one.checkVisibility())")
-    assert page.run("document.querySelectorAll('figure svg').length") >= 13
+    assert page.run("document.querySelectorAll('figure svg').length") >= 12
     found = pixels(page)
     assert found[css(PAGE["light"]["before"])] > 200
     assert found[css(PAGE["light"]["after"])] > 200
@@ -254,3 +254,39 @@ def test_a_script_from_outside_does_not_run(browser, report, tmp_path):
     browser.open(hostile)
     browser.wait(READY)
     assert browser.run("window.hostile") is None
+
+
+def test_tables_of_channels_and_sizes_are_whole_on_a_telephone(page):
+    """Value and degrees of a parameter, rms and noise of a channel: all within the width, with nothing to scroll."""
+    page.resize(400, 800)
+    page.settle()
+    for cells in (".familiar", "table.bars td"):
+        assert page.run(f"document.querySelectorAll('{cells}').length") > 1
+        right = f"Math.max(...[...document.querySelectorAll('{cells}')].map(one => one.getBoundingClientRect().right))"
+        assert page.run(right) <= 400
+    assert page.run("parseFloat(getComputedStyle(document.querySelector('table.fingerprint td')).fontSize)") >= 12
+
+
+def test_every_coloured_line_of_a_dependence_has_its_name(page):
+    """The channels that follow a quantity most are buttons with a piece of their line; one is chosen."""
+    host = "document.querySelector('[data-plot=over-the-rate]')"
+    names = f"[...{host}.querySelectorAll('[aria-label=\"channels that follow it most\"] button')]"
+    assert page.run(f"{names}.length") == 4
+    assert page.run(f"{names}.every(one => one.querySelector('.line').getBoundingClientRect().width > 10)")
+    page.run(f"{names}[2].click()")
+    assert page.run(f"{names}.map(one => one.getAttribute('aria-pressed'))") == ["false", "false", "true", "false"]
+
+
+def test_ticks_of_a_spectrum_are_round_numbers(page):
+    plot = "document.querySelector('[data-plot=over-frequency]')"
+    drawn = page.run(
+        "(() => { const real = CanvasRenderingContext2D.prototype.fillText, words = [];"
+        " CanvasRenderingContext2D.prototype.fillText = function (text, ...more) { words.push(text);"
+        " return real.call(this, text, ...more); };"
+        f" {plot}.querySelector('button[aria-label=\"show everything\"]').click();"
+        " return new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => {"
+        " CanvasRenderingContext2D.prototype.fillText = real; done(words); }))); })()"
+    )
+    numbers = [word for word in drawn if re.fullmatch(r"[\d.]+(e−?\d+)?", word)]
+    assert len(numbers) >= 2
+    assert all(re.fullmatch(r"0*\.?0*[125]0*", word) for word in numbers), numbers

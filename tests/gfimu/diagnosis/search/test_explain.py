@@ -16,7 +16,8 @@ from gfimu.diagnosis.data.table.spins import State
 from gfimu.diagnosis.fit.learn import starting_point
 from gfimu.diagnosis.fit.posterior import condition
 from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.search.explain import Sets, excess, explain, hardly_eases, prune, reduced
+from gfimu.diagnosis.search.explain import explain, reduced
+from gfimu.diagnosis.search.sets import Sets, excess, has_stalled, prune
 from gfimu.geometry.array import AccelerometerArray
 from sim.effects import EFFECTS
 from sim.effects.base import Effect, Size
@@ -149,7 +150,7 @@ def test_a_set_far_behind_is_not_fitted(tilted, monkeypatch):
     gram[:size, :size], score = tilted.best.gram, np.append(tilted.best.score, [0.0, 0.0])
     best = replace(best, gram=gram, score=score, log_posterior=tilted.best.log_posterior - 1.0)
     fitted = []
-    monkeypatch.setattr("gfimu.diagnosis.search.explain.each_apart", lambda work, items: [work(one) for one in items])
+    monkeypatch.setattr("gfimu.diagnosis.search.sets.each_apart", lambda work, items: [work(one) for one in items])
     monkeypatch.setattr(Sets, "_roughly", lambda self, point: fitted.append(frozenset(c.name for c in point.causes)))
     for strong, expected in ((True, [frozenset({"table_tilt"})]), (False, [{"table_tilt"}, {"mount_tilt"}])):
         sets = Sets(tilted.stretches, best.point, Policy())
@@ -192,4 +193,4 @@ def test_more_of_the_same_leads_nowhere_where_much_is_left_and_hardly_less(befor
     stretches = [SimpleNamespace(observations=600), SimpleNamespace(observations=400)]
     fits = [SimpleNamespace(objective=1000.0 * value) for value in (before, after)]
     assert excess(stretches, fits[1]) == pytest.approx(after - 1.0)
-    assert hardly_eases(stretches, *fits, replace(Policy(), free_body=free_body)) == hardly
+    assert has_stalled(stretches, *fits, replace(Policy(), free_body=free_body)) == hardly

@@ -8,7 +8,7 @@ import pytest
 from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.verdict.gate import impossible_sizes, judge, measurable
-from gfimu.diagnosis.verdict.verdict import NamedCause, Residual, Unexplained
+from gfimu.diagnosis.verdict.parts import NamedCause, Residual, Unexplained
 from gfimu.diagnosis.verdict.wording import verdict_sentences
 from gfimu.geometry.array import AccelerometerArray
 from sim.effects import EFFECTS

@@ -14,7 +14,7 @@ from gfimu.diagnosis.verdict.library import (
     standing_out,
     with_library,
 )
-from gfimu.diagnosis.verdict.verdict import NamedCause
+from gfimu.diagnosis.verdict.parts import NamedCause
 
 POLICY, RULE = Policy(), LibraryRule()
 

@@ -26,7 +26,7 @@ from gfimu.diagnosis.verdict.naming import (
     probabilities,
     rival_list,
 )
-from gfimu.diagnosis.verdict.verdict import NamedCause
+from gfimu.diagnosis.verdict.parts import NamedCause
 from sim.effects import EFFECTS, make_effect
 
 TWIN = small_twin("cube12")

@@ -8,8 +8,8 @@ from dataclasses import replace
 import pytest
 from made_diagnoses import made_diagnosis
 
+from gfimu.diagnosis.verdict.parts import NamedCause
 from gfimu.diagnosis.verdict.sample_notes import with_reference_clock
-from gfimu.diagnosis.verdict.verdict import NamedCause
 from sim.twin import Twin
 
 TWIN = Twin.load("cube12_turntable")

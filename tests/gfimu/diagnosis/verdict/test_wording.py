@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from gfimu.diagnosis.criticism.gain import Gain
-from gfimu.diagnosis.verdict.verdict import NamedCause, Residual, Unexplained
+from gfimu.diagnosis.verdict.parts import NamedCause, Residual, Unexplained
 from gfimu.diagnosis.verdict.wording import Notes, verdict_sentences
 
 FALLS = Residual(0.3, 0.1, 0.1, {}, {})
@@ -33,11 +33,11 @@ def test_explained():
         "table_tilt: gravity turns once per revolution.",
         "The residual falls from 0.3 to 0.1 m/s²; the noise alone is 0.1 m/s².",
     )
-    assert words[3].startswith("On data the fit never saw (blocks), 97.0% of the excess is gone.")
+    assert words[3].startswith("On validation data (blocks), 97.0 % of the excess is gone.")
     assert len(words) == 4
     part = told("explained", [TILT], gain=Gain("blocks", 0.3, 0.1, 0.85, 2.0, 0.1))
     assert part[0] == (
-        "The simulation is wrong in part because of table_tilt: 85% of the excess is gone on data the fit never saw."
+        "The simulation is wrong in part because of table_tilt: 85 % of the excess is gone on validation data."
     )
 
 
@@ -47,14 +47,14 @@ def test_what_is_left_is_told_from_a_tenth_of_the_noise_on(after, says):
     words = told("explained", [TILT], residual=residual, rest="a11 follows the rate")
     assert any("times the noise (a11 follows the rate)" in one for one in words) == says
     significant = told("explained", [TILT], residual=residual, unexplained=Unexplained(True, "a tone in a11"))
-    assert "Something is left that nothing in the library explains: a tone in a11." in significant
+    assert "A significant residual remains that nothing in the library explains: a tone in a11." in significant
     assert not any("times the noise" in one for one in significant)
 
 
 def test_far_less_on_unseen_data_is_told():
     # Fitted: all of the excess; unseen: a quarter less is the limit, beyond two standard errors.
     far = told("explained", [TILT], gain=Gain("blocks", 0.3, 0.1, 0.7, 2.0, 0.1, share_std=0.01))
-    assert any(one.startswith("On the fitted data 100% of it is gone") for one in far)
+    assert any(one.startswith("On the fitted data 100 % of it is gone") for one in far)
     near = told("explained", [TILT], gain=Gain("blocks", 0.3, 0.1, 0.7, 2.0, 0.1, share_std=0.05))
     assert not any(one.startswith("On the fitted data") for one in near)
 
@@ -82,7 +82,7 @@ def test_unknown():
     assert any(one.startswith("The residual falls") for one in words)
     none = told("unknown", unexplained=Unexplained(True, "x"), terms=0)
     assert none[1].startswith("No function of the motion, the angle or time predicts it")
-    assert not any("Something is left" in one for one in (*words, *none))
+    assert not any("significant residual remains" in one for one in (*words, *none))
 
 
 def test_notes_come_last_in_order():

@@ -14,7 +14,7 @@ import numpy as np
 
 from gfimu.errors import InputError
 from gfimu.files.input_file import check_input
-from gfimu.recording import Recording
+from gfimu.recording.recording import Recording
 
 __all__ = ["recording_lines"]
 
