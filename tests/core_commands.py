@@ -65,6 +65,7 @@ WORKING = (
     Call("diagnose run.parquet --twin cube12_turntable --out diagnosis", 0, "eccentricity"),
     Call("campaign plan.toml --out campaign --workers 1", 0, "rad"),
     Call("list frames", 0, "packet"),
+    Call("benchmark list", 0, "greedy_bic"),
 )
 """Calls that need the core alone."""
 
@@ -72,7 +73,9 @@ REFUSED = (
     refused("demo", "gfimu demo", "mujoco, rerun-sdk and matplotlib", "sim,view,plot"),
     refused("simulate paper_run --out no.csv", *MUJOCO),
     refused("tolerance cube12 --closed-form", *MUJOCO),
-    refused("benchmark list", "gfimu benchmark", "mujoco", "sim"),
+    refused("benchmark worlds --out no", "gfimu benchmark", "mujoco", "sim"),
+    refused("benchmark table rest.csv", "gfimu benchmark", "mujoco", "sim"),
+    refused("benchmark run greedy_bic --out no", "gfimu benchmark", "mujoco", "sim"),
     refused("firmware run --out no.csv", "gfimu firmware run", "unicorn and mujoco", "firmware,sim"),
     refused("convert cube12 no.xml", "no.xml: what is converted", "mujoco", "sim"),
     refused("convert run.csv no.mcap", "no.mcap: what is converted", "mcap and rosbags", "formats"),

@@ -404,6 +404,7 @@ LARGE_ROOMS = {
     "gfimu.calibration": {
         "gfimu.files",
         "gfimu.geometry",
+        "gfimu.importing.guessing.likely_reference",
         "gfimu.parts",
         "gfimu.rate",
         "gfimu.recording",
@@ -496,7 +497,7 @@ BESIDE = {"gfimu.diagnosis.policy", "gfimu.generic_basis", "gfimu.geometry.array
 """What every room of the diagnosis may import besides."""
 
 OUTSIDE = {
-    "data": {"gfimu.recording", "gfimu.motion.body_drive"},
+    "data": {"gfimu.importing.guessing.likely_reference", "gfimu.recording", "gfimu.motion.body_drive"},
     "terms": {"gfimu.motion.body_drive"},
     "criticism": {"gfimu.geometry.kinematics", "gfimu.motion.attitude"},
     "design": {"gfimu.recording", "gfimu.importing.oddities", "gfimu.geometry.smooth_ramp"},

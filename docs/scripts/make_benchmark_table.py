@@ -10,9 +10,8 @@ from make_cli_reference import escape
 
 from sim.benchmark.judge import Judged
 from sim.benchmark.judged_file import read_judged
-from sim.benchmark.release import SETS, cases
+from sim.benchmark.release import SETS, cases, release_hash
 from sim.benchmark.table import markdown, summaries
-from sim.benchmark.truth_file import release_hash
 
 FOLDER = Path(__file__).resolve().parents[1] / "accuracy"
 PAGE, JUDGED = FOLDER / "benchmark.md", FOLDER / "benchmark.jsonl.xz"

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.signal import savgol_coeffs, savgol_filter
 
 from gfimu.errors import InputError
+from gfimu.importing.guessing.likely_reference import reference_remedy
 from gfimu.recording import Recording
 from gfimu.recording.rest import detect_rest
 from gfimu.recording.timing.reference_times import reference_on_rows
@@ -92,8 +93,10 @@ def motion_reference(recording: Recording, *, omega_std: float | None = None) ->
         alpha_std = max(noise * float(np.linalg.norm(slope)) * np.sqrt(window), 1e-6)
         kind, omega = "turntable", np.column_stack([np.zeros((len(tacho), 2)), tacho])
     else:
+        likely = reference_remedy({**recording.extra, **recording.reference}, "tacho_rad_s")
         raise InputError(
             "positions need a reference of the rotation: the recording has neither tacho_rad_s nor gyro_x/y/z_rad_s"
+            + f"; {likely}" * bool(likely)
         )
     moving = np.linalg.norm(omega, axis=1) > _STANDING_RATE
     rows = np.flatnonzero(moving & np.isfinite(omega).all(axis=1) & np.isfinite(recording.readings).all(axis=1))

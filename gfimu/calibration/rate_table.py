@@ -26,6 +26,7 @@ from gfimu.calibration.parameter_names import parameter_names
 from gfimu.calibration.result import Calibration
 from gfimu.errors import InputError
 from gfimu.geometry.gravity import EARTH_RATE
+from gfimu.importing.guessing.likely_reference import reference_remedy
 from gfimu.rate.integration import integrate_samples
 from gfimu.recording import Recording
 from gfimu.recording.rest import detect_rest, mean_variance_factor
@@ -104,10 +105,15 @@ def find_plateaus(
     run = reference_on_rows(recording)
     missing = [name for name in GYRO_COLUMNS if name not in run.reference]
     if missing:
-        raise InputError(f"the recording lacks {', '.join(missing)}; a gyro calibration needs all three")
+        likely = reference_remedy(run.extra, missing[0])
+        raise InputError(
+            f"the recording lacks {', '.join(missing)}; a gyro calibration needs all three"
+            + f"; {likely}" * bool(likely)
+        )
     table = next((name for name in _TABLE_RATES if name in run.reference), None)
     if table is None:
-        raise InputError("the recording lacks tacho_rad_s; the rate of the table is the reference")
+        likely = reference_remedy(run.extra, _TABLE_RATES[0])
+        raise InputError("the recording lacks tacho_rad_s; " + (likely or "the rate of the table is the reference"))
     readings = np.column_stack([run.reference[name] for name in (*GYRO_COLUMNS, table)])  # (n, 4)
     seen = replace(run, readings=readings, channels=("gyro1", "gyro2", "gyro3", "table"), reference={}, unit="rad_s")
     rest = detect_rest(seen, threshold=threshold, min_duration_s=min_duration_s)

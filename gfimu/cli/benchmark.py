@@ -49,6 +49,8 @@ def _list(json: JsonOption = False) -> None:
     Examples
     --------
     gfimu benchmark list
+    # Hash of the release, sets and methods for a program
+    gfimu benchmark list --json
     """
     from gfimu.commands.benchmark import benchmark_list
 
@@ -185,6 +187,8 @@ def _table(
     Examples
     --------
     gfimu benchmark table mine.jsonl greedy.jsonl
+    # One method, for a program
+    gfimu benchmark table mine.jsonl --json
     """
     from gfimu.commands.benchmark import table
 

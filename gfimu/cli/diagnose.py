@@ -41,7 +41,10 @@ def _diagnose(
     ],
     twin: TwinOption,
     out: Annotated[
-        Path | None, typer.Option("--out", help="Folder to write: verdict.json, twin.toml, report.html, diagnosis.rrd.")
+        Path | None,
+        typer.Option(
+            "--out", help="Folder to write: verdict.json, twin.toml with its array, report.html, diagnosis.rrd."
+        ),
     ] = None,
     check: Annotated[
         bool, typer.Option("--check", help="Only look at the recordings, as `gfimu check`: no diagnosis, no --out.")
@@ -97,8 +100,7 @@ def _diagnose(
         return
     if out is None:
         raise InputError("--out is missing: the folder for the diagnosis; --check needs none")
-    from gfimu.commands.diagnose import diagnose
-    from gfimu.diagnosis.report.folder import files_to_write
+    from gfimu.commands.diagnose import diagnose, written_files
 
     interrupted = False
 
@@ -123,7 +125,7 @@ def _diagnose(
             grammar=grammar,
             force=force,
         )
-    written = {meaning: out / name for name, meaning in files_to_write().items()}
+    written = written_files(found, out)
     if json:
         print_json(found.to_dict() | {"files": written})
     else:

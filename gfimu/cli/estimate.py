@@ -210,24 +210,26 @@ def _print_summary(summary: EstimateSummary) -> None:
         rows.append(("channels left out", ", ".join(summary.channels_left_out), ""))
     print_table(f"{summary.array}, method {summary.method}, {summary.form} form", ("quantity", "value", "unit"), rows)
     if summary.at_rest is not None:
-        _print_at_rest(summary.at_rest)
+        _print_at_rest(summary.at_rest, has_tacho=summary.tacho_rmse_rad_s is not None)
     if summary.position is not None:
         _print_position(summary.position)
     if summary.mounting is not None:
         _print_mounting(summary.mounting)
 
 
-def _print_at_rest(found: ForceAtRest) -> None:
-    """Print what p reads beyond gravity at rest, and the lean that would read the same."""
+def _print_at_rest(found: ForceAtRest, *, has_tacho: bool) -> None:
+    """Print what p reads beyond gravity at the first rest, and the lean that would read the same."""
     rows = [
         ("bias of p", *(f"{value:+.2f}" for value in found.bias_mg), f"{found.magnitude_mg:+.2f}"),
         ("standard uncertainty", *(f"{value:.2g}" for value in found.std_mg), f"{found.magnitude_std_mg:.2g}"),
     ]
     print_table(
-        f"Equivalent biases of p at rest, {found.start_s:.4g} to {found.stop_s:.4g} s, mg",
+        f"Equivalent biases of p, first rest ({found.start_s:.4g} to {found.stop_s:.4g} s), mg",
         ("mean less gravity", "x", "y", "z", "magnitude"),
         rows,
-        note=f"At rest a bias and a lean are one: a lean of {math.degrees(found.lean_rad):.2g}° reads the same across "
+        note="The first rest is the first stretch in which no reading varies beyond its noise. "
+        + ("" if has_tacho else "Without a tachometer a steady spin may pass for one. ")
+        + f"At rest a bias and a lean are one: a lean of {math.degrees(found.lean_rad):.2g}° reads the same across "
         "the vertical. No lean makes the magnitude.",
     )
 

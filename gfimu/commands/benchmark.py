@@ -30,18 +30,13 @@ _LINES = OutputFile("a file of judged answers", (".jsonl", ".xz"))
 
 def methods() -> dict[str, str]:
     """Return the methods that come with the benchmark: name, and the function behind it."""
-    from sim.benchmark.methods import BASELINES
+    from sim.benchmark.baselines import BASELINES
 
     return {OWN: _OWN_METHOD, **BASELINES}
 
 
 def benchmark_list() -> BenchmarkList:
     """List the sets of the benchmark, their sizes and licences, and the methods that come with it.
-
-    Raises
-    ------
-    MissingPackageError
-        If MuJoCo is not installed.
 
     Examples
     --------
@@ -50,9 +45,7 @@ def benchmark_list() -> BenchmarkList:
     >>> [one["name"] for one in found.sets]
     ['own', 'independent', 'unlisted', 'dcmotor', 'real']
     """
-    require("gfimu benchmark", "mujoco")
-    from sim.benchmark.release import RELEASE, SETS, SPLITS, cases
-    from sim.benchmark.truth_file import release_hash
+    from sim.benchmark.release import RELEASE, SETS, SPLITS, cases, release_hash
 
     sets = tuple(
         {"name": one.name, "about": one.about, "licence": one.licence}
@@ -244,7 +237,10 @@ def table(results: str | Path | Sequence[str | Path]) -> Judgement:
     ------
     InputError
         If a file is wrong.
+    MissingPackageError
+        If MuJoCo is not installed.
     """
+    require("gfimu benchmark", "mujoco")
     from sim.benchmark.judged_file import read_judged
     from sim.benchmark.table import summaries
 

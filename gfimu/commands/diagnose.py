@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from sim.twin import Twin
     from sim.world import World
 
-__all__ = ["FOLDER", "diagnose", "write_report"]
+__all__ = ["FOLDER", "diagnose", "write_report", "written_files"]
 
 EXPLAINED = frozenset({"sign", "exchange", "dead", "rest_bias"})
 """Findings of a recording's checks that are effects of the library: the diagnosis explains them."""
@@ -65,8 +65,9 @@ def diagnose(
         The simulation to check: a twin, its name or file; or a simulation of one's own, as such or as
         ``rig.py:function`` (`gfimu.own_rig.load_model`).
     out : str or Path, optional
-        Folder for ``verdict.json``, ``twin.toml``, ``report.html`` and ``diagnosis.rrd``; made if it isn't there. A
-        file whose package is not installed is left out, with a warning before the work begins.
+        Folder for ``verdict.json``, ``twin.toml``, ``report.html`` and ``diagnosis.rrd``, and ``array.toml`` where the
+        twin's array is no shipped one; made if it isn't there. A file whose package is not installed is left out, with
+        a warning before the work begins.
     held_out : as recordings
         Recordings kept for measuring the gain.
     calibration : Calibration, str or Path, optional
@@ -214,25 +215,37 @@ def write_report(diagnosis: Diagnosis, folder: str | Path) -> Path:
     >>> import gfimu
     >>> gfimu.write_report(gfimu.diagnose("run.parquet", "cube12_turntable"), "diagnosis")  # doctest: +SKIP
     """
+    from gfimu.diagnosis.report.folder import write_diagnosis
+
+    text, more = _twin_files(diagnosis)
+    written = write_diagnosis(folder, diagnosis, twin_toml=text, more=more, rig=drawn_rig(diagnosis))
+    return written.get("report", written["verdict"])
+
+
+def written_files(diagnosis: Diagnosis, folder: str | Path) -> dict[str, Path]:
+    """Return the files that `write_report` writes to a folder, by what they are called."""
+    from gfimu.diagnosis.report.folder import files_of
+
+    names = files_of(diagnosis, _twin_files(diagnosis)[1])
+    return {meaning: Path(folder) / name for name, meaning in names.items()}
+
+
+def _twin_files(diagnosis: Diagnosis) -> tuple[str, dict[str, str]]:
+    """Return the text of the extended twin's file, and the texts of files that it names, by file name."""
     import tomli_w
 
-    from gfimu.diagnosis.report.folder import write_diagnosis
     from gfimu.files.model_files import list_models
     from sim.twin import Twin
 
     twin = diagnosis.twin
     if not isinstance(twin, Twin):
-        written = write_diagnosis(folder, diagnosis, twin_toml=twin.to_toml())
-        return written.get("report", written["verdict"])
-    content = twin.to_dict()
-    more = {}
+        return twin.to_toml(), {}
+    content, more = twin.to_dict(), {}
     if twin.array_name not in list_models("arrays"):
         # An array file of the user's, and a calibrated one, is named relative to the twin file: it moves with it.
         content["array"] = "array.toml"
         more["array.toml"] = twin.array.to_toml()
-    rig = drawn_rig(diagnosis)
-    written = write_diagnosis(folder, diagnosis, twin_toml=tomli_w.dumps(content), more=more, rig=rig)
-    return written.get("report", written["verdict"])
+    return tomli_w.dumps(content), more
 
 
 def drawn_rig(diagnosis: Diagnosis) -> DrawnRig | None:

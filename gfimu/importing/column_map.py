@@ -16,7 +16,18 @@ from gfimu.files.model_files import find_model, list_models, read_toml
 from gfimu.importing.map_keys import FOR_ALL, complete, set_map_key
 from gfimu.importing.notation import factor_of
 
-__all__ = ["ColumnMap", "ColumnSpec", "DropKind", "TextSpec", "TimeSpec", "list_maps", "load_map", "map_toml"]
+__all__ = [
+    "REFERENCE_KINDS",
+    "UNMAPPED",
+    "ColumnMap",
+    "ColumnSpec",
+    "DropKind",
+    "TextSpec",
+    "TimeSpec",
+    "list_maps",
+    "load_map",
+    "map_toml",
+]
 
 _Meta = msgspec.Meta
 
@@ -42,6 +53,10 @@ _Column = Annotated[
     str | int | tuple[str | int, ...],
     _Meta(description="Name of the column, or its number from 1; of several the first one that is there."),
 ]
+
+
+UNMAPPED = "raw_"
+"""How the names of columns that a map does not name begin in a recording."""
 
 
 class ColumnSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

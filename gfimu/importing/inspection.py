@@ -11,15 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.errors import InputError
+from gfimu.files.table import ArrowStream
 from gfimu.importing.clock import Times, times_of
 from gfimu.importing.column_map import ColumnMap, TextSpec, TimeSpec, map_toml
+from gfimu.importing.guessing.likely_reference import likely_references
 from gfimu.importing.guessing.suggestion import roles_by_map, suggest, with_shipped
 from gfimu.importing.oddities import oddities
 from gfimu.importing.raw_table import RawFile, RawTable
 from gfimu.importing.readers import read_foreign
+from gfimu.importing.readers.tables import table_file
 from gfimu.importing.recognise import fitting_maps, own_chips
 from gfimu.results import TableResult, text_column
-from gfimu.units import REFERENCE_UNITS, TIME_COLUMNS
+from gfimu.units import REFERENCE_UNITS, TIME_COLUMNS, reference_quantity
 
 __all__ = ["ColumnView", "Inspection", "inspect_file"]
 
@@ -151,13 +154,13 @@ class Inspection(TableResult):
         }
 
 
-def inspect_file(path: str | Path, *, table: str = "", text: TextSpec = TextSpec()) -> Inspection:
+def inspect_file(path: str | Path | ArrowStream, *, table: str = "", text: TextSpec = TextSpec()) -> Inspection:
     """Look at a file of unknown layout.
 
     Parameters
     ----------
-    path : str or Path
-        The file, of any format that has a reader.
+    path : str, Path or table
+        The file, of any format that has a reader, or a table of pandas, polars or pyarrow.
     table : str
         Table of the file to look at; by default the one with the most triads of accelerations.
     text : TextSpec
@@ -166,18 +169,20 @@ def inspect_file(path: str | Path, *, table: str = "", text: TextSpec = TextSpec
     Raises
     ------
     InputError
-        If the file can't be read at all.
+        If the file can't be read at all, or it is neither a path nor a table.
     """
-    raw = read_foreign(path, text=text)
+    raw = read_foreign(path, text=text) if isinstance(path, str | Path) else table_file(path)
     widest = max(raw.tables.values(), key=lambda one: len(one.columns))
     if len(widest.columns) > _MOST_COLUMNS or len(raw.tables) > _MOST_TABLES:
         what = f"{len(widest.columns)} columns" if len(widest.columns) > _MOST_COLUMNS else f"{len(raw.tables)} tables"
-        raise InputError(f"{path}: has {what}, too many to guess what they are; name those of the recording in a map")
+        raise InputError(
+            f"{raw.source}: has {what}, too many to guess what they are; name those of the recording in a map"
+        )
     plain = raw.table(table) if table else next(iter(raw.tables.values()))
     own = own_chips(list(plain.columns))
     if own:
         return _own_recording(raw, plain, own)
-    found = suggest(raw, table=table, name=_map_name(path), text=text)
+    found = suggest(raw, table=table, name=_map_name(raw.source), text=text)
     fitting = tuple(fitting_maps(raw))
     suggested, reasons = found.column_map, found.reasons
     time, is_rate_known, roles = found.time.spec, found.time.is_rate_known, found.roles
@@ -210,7 +215,12 @@ def _own_recording(raw: RawFile, table: RawTable, chips: dict[str, list[str]]) -
     channels = [name for names in chips.values() for name in names]
     roles = {name: f"{name.partition('_')[0]}, {name.partition('_')[2]}" for name in channels} | {"t_s": "time"}
     roles |= {name: "reference" for name in table.columns if _is_reference(name) and name != "t_s"}
+    have = {reference_quantity(name) for name, role in roles.items() if role == "reference"}
+    further = {name: values for name, values in table.columns.items() if name not in roles}
+    likely = [one for one in likely_references(further) if reference_quantity(one.reference) not in have]
+    roles |= {one.column: f"{reference_quantity(one.reference)}? {one.unit}" for one in likely}
     times, findings = _times(table, TimeSpec("t_s"), raw.source, drop=("duplicates", "unordered"))
+    findings += [f"{one.reference} is not there; {one.remedy}" for one in likely]
     if times is not None and times.dropped:
         findings.append("with such rows it is refused; gfimu convert --drop duplicates,unordered leaves them out")
     findings += oddities({name: table.numbers(name) for name in channels})
@@ -241,8 +251,8 @@ def _rate(times: Times | None) -> float:
     return 1.0 / float(np.median(np.diff(times.t_s))) if times is not None and len(times.t_s) > 1 else float("nan")
 
 
-def _map_name(path: str | Path) -> str:
-    return Path(path).name.partition(".")[0] or "map"
+def _map_name(source: str) -> str:
+    return Path(source).name.partition(".")[0] or "map"
 
 
 def _view(table: RawTable, name: str, role: str) -> ColumnView:

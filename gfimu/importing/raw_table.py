@@ -45,17 +45,19 @@ class RawTable:
     def find(self, wanted: str | int | Sequence[str | int]) -> str | None:
         """Return the name of the column that is wanted, or of the first there of several; None without any.
 
-        Letters of either size are the same; a unit in brackets may be left away; a number counts from 1.
+        Letters of either size are the same; a unit in brackets may be left away; a number counts from 1. Underscores
+        stand for the blanks of a name, as in a recording of the file.
         """
         names = list(self.columns)
         plain = {_plain(name): name for name in reversed(names)}
+        joined = {_plain(name).replace(" ", "_"): name for name in reversed(names)}
         short = {_plain(bracketed_unit(name)[0]): name for name in reversed(names)}
         for one in [wanted] if isinstance(wanted, str | int) else wanted:
             if isinstance(one, int):
                 if 1 <= one <= len(names):
                     return names[one - 1]
                 continue
-            found = plain.get(_plain(one)) or short.get(_plain(one))
+            found = plain.get(_plain(one)) or short.get(_plain(one)) or joined.get(_plain(one))
             if found is not None:
                 return found
         return None

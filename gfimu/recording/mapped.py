@@ -17,11 +17,10 @@ from gfimu.errors import InputError, RecordingWarning
 from gfimu.files.table import ArrowStream, schema_metadata
 from gfimu.files.table_columns import TableColumns
 from gfimu.geometry.array import AccelerometerArray
-from gfimu.importing.column_map import ColumnMap, load_map
+from gfimu.importing.column_map import UNMAPPED, ColumnMap, load_map
 from gfimu.importing.piece import Piece, combined_file, merged_piece, piece_of
-from gfimu.importing.raw_table import RawFile, RawTable
 from gfimu.importing.readers import read_foreign
-from gfimu.importing.readers.tables import arrow_table
+from gfimu.importing.readers.tables import table_file
 from gfimu.recording.carried_array import array_metadata
 from gfimu.recording.filtered import filtered_recording, rows_between, without_rows
 from gfimu.recording.recording import Recording
@@ -110,7 +109,7 @@ def mapped_recording(
         paths = [source] if isinstance(source, str | Path) else source
         files = [read_foreign(one, chosen.format, chosen.text) for one in paths]
     else:
-        files = [RawFile(TableColumns(source).file, "table", {"": _as_raw(source)})]
+        files = [table_file(source)]
     whole = combined_file(files, chosen)
     pieces = [piece_of(one, chosen) for one in (files if whole is None else [whole])]
     geometry = array or (AccelerometerArray.load(chosen.array) if chosen.array and len(pieces) == 1 else None)
@@ -149,11 +148,6 @@ def mapped_reference(
     return piece.times.t_s, dict(piece.reference), piece.times.origin_s
 
 
-def _as_raw(source: Any) -> RawTable:
-    table = pa.Table.from_pandas(source) if hasattr(source, "reset_index") else pa.table(source)
-    return arrow_table(table)
-
-
 def _between(piece: Piece, chosen: ColumnMap) -> Piece:
     """Return the samples from the map's ``start_s`` to its ``stop_s`` after the first one."""
     rows = rows_between(piece.times.t_s, chosen.time, piece.source)
@@ -179,7 +173,7 @@ def _recording(piece: Piece, chosen: ColumnMap, array: AccelerometerArray | None
     columns |= {f"{name}_m_s2": values for name, values in zip(names, piece.channels.values(), strict=True)}
     columns |= dict(piece.reference)
     for name, values in piece.other.items():
-        columns[f"raw_{'_'.join(name.split())}"] = values
+        columns[f"{UNMAPPED}{'_'.join(name.split())}"] = values
     metadata: dict[str, Any] = {"column_map": chosen.name, "source_files": [Path(one).name for one in sources]}
     if piece.times.origin_s:
         metadata["time_origin_s"] = piece.times.origin_s
@@ -189,6 +183,6 @@ def _recording(piece: Piece, chosen: ColumnMap, array: AccelerometerArray | None
         metadata["dropped_rows"] = dict(piece.times.dropped)
     table = TableColumns(pa.table(dict(columns)).replace_schema_metadata(schema_metadata(metadata)))
     table.file = piece.source
-    recording = Recording.read(table, array=array)  # type: ignore[arg-type]
+    recording = replace(Recording.read(table, array=array), unit_from="column_map")  # type: ignore[arg-type]
     absent = np.column_stack([np.isnan(values) for values in piece.channels.values()])
     return without_rows(recording, chosen.drop, absent=absent, source=piece.source, array=array)

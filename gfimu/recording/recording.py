@@ -59,6 +59,9 @@ class Recording(RunResult):
         Columns that the format does not know, kept as they came.
     unit : {"m_s2", "lsb"}
         Unit of ``readings``.
+    unit_from : {"", "unit", "units", "column_map"}
+        Which argument stated the unit of the numbers that it was made from, for messages; by default the columns' names
+        did. It is not written to files.
 
     Examples
     --------
@@ -77,6 +80,7 @@ class Recording(RunResult):
     metadata: Mapping[str, Any] = field(default_factory=dict)
     extra: Mapping[str, NDArray[Any]] = field(default_factory=dict)
     unit: str = "m_s2"
+    unit_from: str = ""
 
     def __post_init__(self) -> None:
         if self.readings.shape != (len(self.t_s), len(self.channels)):
@@ -344,7 +348,7 @@ class Recording(RunResult):
             columns.rename({name: f"{name}_{units}" for name in bare})
         elif units is not None:
             columns.rename({name: f"{name}_{one}" for name, one in units.items()})
-        found = cls._read(columns, geometry, unit)
+        found = cls._read(columns, geometry, unit, "units" if isinstance(units, str) else "")
         return found if geometry is None else found.carrying(geometry)
 
     @classmethod
@@ -405,8 +409,8 @@ class Recording(RunResult):
                     f"{_ARRAYS}: {name} has shape {value.shape}; it needs one value per sample, {time.shape}"
                 )
         table = TableColumns.of(columns, {**array_metadata(geometry), **(metadata or {})}, _ARRAYS)
-        return cls._read(table, geometry, "lsb" if unit == "lsb" else "m_s2")
+        return cls._read(table, geometry, "lsb" if unit == "lsb" else "m_s2", "unit")
 
     @classmethod
-    def _read(cls, table: TableColumns, array: AccelerometerArray | None, unit: str) -> Recording:
-        return cls.read(cast("ArrowStream", table), array=array, unit=unit)
+    def _read(cls, table: TableColumns, array: AccelerometerArray | None, unit: str, unit_from: str) -> Recording:
+        return replace(cls.read(cast("ArrowStream", table), array=array, unit=unit), unit_from=unit_from)

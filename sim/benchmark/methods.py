@@ -20,16 +20,10 @@ from sim.sweep.dataset import Dataset
 from sim.sweep.design import Case
 from sim.sweep.plan import PlanFile
 
-__all__ = ["BASELINES", "Method", "answer_task", "answers_of", "benchmark_plan", "benchmark_work", "load_method"]
+__all__ = ["Method", "answer_task", "answers_of", "benchmark_plan", "benchmark_work", "load_method"]
 
 Method = Callable[[Task], Mapping[str, Any]]
 """A method: it takes a task and returns the JSON form of an `Answer`; ``world`` and ``method`` are filled in."""
-
-BASELINES = {
-    name: f"sim.benchmark.baselines.{name}:answer"
-    for name in ("always_unknown", "best_single", "greedy_bic", "sysid", "oracle")
-}
-"""Methods that come with the benchmark, beside gfimu's own (`gfimu.commands.benchmark`)."""
 
 
 def load_method(reference: str) -> Method:

@@ -6,19 +6,36 @@ Names of effects stand here as text, so that a library that grows does not chang
 from __future__ import annotations
 
 import functools
+import hashlib
 import itertools
+import lzma
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from gfimu.errors import InputError, unknown_name
 
-__all__ = ["MEASURED", "RELEASE", "SETS", "SPLITS", "Case", "SetInfo", "cases", "find_case"]
+__all__ = [
+    "MEASURED",
+    "RELEASE",
+    "SETS",
+    "SPLITS",
+    "TRUTH_FILE",
+    "Case",
+    "SetInfo",
+    "cases",
+    "find_case",
+    "release_hash",
+]
 
 RELEASE = "gfimu-bench-1"
 """Name of the release; answers carry it."""
+
+TRUTH_FILE = Path(__file__).with_name(f"{RELEASE}.jsonl.xz")
+"""What the release says of its worlds (`sim.benchmark.truth_file`)."""
 
 MEASURED = "measured"
 """Generator of the worlds that are not drawn but measured."""
@@ -221,3 +238,8 @@ def find_case(world: str) -> Case:
             if case.world == world:
                 return case
     raise InputError(f"{RELEASE} has no world {world!r}; names are like own/test/007 (gfimu benchmark list)")
+
+
+def release_hash() -> str:
+    """Return the hash of the release: of its truth, which holds the hash of each recording."""
+    return hashlib.sha256(lzma.decompress(TRUTH_FILE.read_bytes())).hexdigest()[:16]

@@ -10,7 +10,6 @@ import argparse
 import functools
 import hashlib
 import json
-import lzma
 import math
 import sys
 from collections.abc import Mapping, Sequence
@@ -24,14 +23,12 @@ import numpy as np
 from gfimu.errors import InputError
 from gfimu.recording import Recording
 from sim.benchmark.drawing import draw
-from sim.benchmark.release import MEASURED, RELEASE, SETS, SPLITS, Case, cases, find_case
+from sim.benchmark.release import MEASURED, SETS, SPLITS, TRUTH_FILE, Case, cases, find_case
 from sim.benchmark.ties import free_distance_and_ties
 from sim.benchmark.world import Task, Truth
 from sim.json_lines import read_lines, six_digits, write_lines
 
-__all__ = ["TRUTH_FILE", "Fixed", "digest_of", "fixed_world", "release_hash", "task_of", "truths"]
-
-TRUTH_FILE = Path(__file__).with_name(f"{RELEASE}.jsonl.xz")
+__all__ = ["Fixed", "digest_of", "fixed_world", "task_of", "truths"]
 
 LEAST_VISIBLE = 7.0
 """d′ with the drive unknown below which what is hidden counts as not to be seen: such a draw is replaced."""
@@ -75,11 +72,6 @@ def digest_of(recording: Recording) -> str:
     for values, step in parts:
         found.update(np.rint(np.nan_to_num(values, nan=-1e6) / step).astype("<i8").tobytes())
     return found.hexdigest()[:16]
-
-
-def release_hash() -> str:
-    """Return the hash of the release: of its truth, which holds the hash of each recording."""
-    return hashlib.sha256(lzma.decompress(TRUTH_FILE.read_bytes())).hexdigest()[:16]
 
 
 @functools.cache

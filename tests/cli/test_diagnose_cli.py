@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from gfimu import AccelerometerArray, Recording
+from gfimu.files.model_files import find_model
 from sim.effects import make_effect
 from sim.motions.motion import SplineSpin
 from sim.scenarios import Scenario
@@ -137,14 +138,20 @@ def test_fitted_positions_of_a_calibration_are_the_twins(gfimu_command, ordinary
 
 def test_an_array_file_moves_with_the_twin(gfimu_command, ordinary, tmp_path, plain_report):
     plain_report()
-    (tmp_path / "mine.toml").write_text(AccelerometerArray.load("cube12").to_toml().replace('"cube12"', '"mine"'))
+    text = AccelerometerArray.load("cube12").to_toml().replace('"cube12"', '"mine"')
+    (tmp_path / "mine.toml").write_text(text.replace('"adxl345"', '"my_part.toml"', 1))
+    (tmp_path / "my_part.toml").write_text(find_model("parts", "adxl345").read_text())
     (tmp_path / "twin.toml").write_text('array = "mine.toml"\n')
     ordinary.write(tmp_path / "run.parquet")
     out = tmp_path / "out"
     done = gfimu_command("diagnose", tmp_path / "run.parquet", "--twin", tmp_path / "twin.toml", "--out", out, "--json")
     assert done.code == 0, done.stderr
-    assert json.loads(done.stdout)["verdict"] == "nothing_found"
+    found = json.loads(done.stdout)
+    assert found["verdict"] == "nothing_found"
     assert Twin.load(out / "twin.toml").array.name == "mine"
+    assert {str(file) for file in out.iterdir()} == set(found["files"].values())
+    assert found["files"]["array"] == str(out / "array.toml")
+    assert found["files"]["part my_part"] == str(out / "my_part.toml")
 
 
 def rest() -> Recording:

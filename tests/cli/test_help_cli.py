@@ -14,7 +14,7 @@ from gfimu.cli.app import program
 from gfimu.cli.command_list import COMMANDS, JOBS
 from gfimu.cli.help_text import examples_of
 
-GROUPS = ("campaign", "firmware")
+GROUPS = ("benchmark", "campaign", "firmware")
 
 
 def commands():
@@ -33,6 +33,8 @@ CHEAP = (
     "gfimu show adxl355",
     "gfimu new array --out my_array.toml --schema array.schema.json",
     "gfimu new sender my_sender",
+    "gfimu benchmark list",
+    "gfimu benchmark list --json",
     "gfimu schema estimate",
     "gfimu schema campaign table --out table.schema.json",
     "gfimu score cube12 p3_three_plus_one --speed-rad-s 10",

@@ -10,6 +10,7 @@ from scipy.signal import savgol_coeffs, savgol_filter
 
 from gfimu.calibration.spin.policy import SpinPolicy
 from gfimu.errors import InputError
+from gfimu.importing.guessing.likely_reference import reference_remedy
 from gfimu.recording import Recording
 from gfimu.recording.timing.reference_times import reference_on_rows
 
@@ -101,7 +102,10 @@ def find_plateaus(recording: Recording, wave_std: Floats, min_duration_s: float,
     recording = reference_on_rows(recording)
     tacho = recording.reference.get("tacho_rad_s")
     if tacho is None or not np.isfinite(tacho).any():
-        raise InputError("spin needs the table's rate: the recording has no tacho_rad_s column")
+        likely = reference_remedy({**recording.extra, **recording.reference}, "tacho_rad_s")
+        raise InputError(
+            "spin needs the table's rate: the recording has no tacho_rad_s column" + f"; {likely}" * bool(likely)
+        )
     stretches, noise = _stretches(recording, tacho, min_duration_s, policy)
     saturated = _saturated(recording.readings, stretches, policy)
     rows = [

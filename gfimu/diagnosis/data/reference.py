@@ -11,6 +11,7 @@ from scipy.integrate import cumulative_trapezoid
 
 from gfimu.diagnosis.data.time_grid import TimeGrid
 from gfimu.errors import InputError
+from gfimu.importing.guessing.likely_reference import reference_remedy
 from gfimu.recording import Recording
 from gfimu.recording.timing.conversion_times import output_data_rate
 from gfimu.recording.timing.reference_times import reference_times
@@ -60,20 +61,21 @@ def driving_reference(recording: Recording, model: WorldModel, name: str) -> tup
     if model.drive_source == "gyro":
         for column in GYRO_COLUMNS:
             if column not in have:
-                raise InputError(
-                    f"{name}: column {column} is missing, but the twin's drive source is 'gyro'; record the gyro "
-                    "with the channels"
-                )
+                remedy = reference_remedy(recording.extra, column) or "record the gyro with the channels"
+                raise InputError(f"{name}: column {column} is missing, but the twin's drive source is 'gyro'; {remedy}")
         return "gyro", np.linalg.norm(np.column_stack([have[column] for column in GYRO_COLUMNS]), axis=1)
     column = REFERENCE_COLUMNS[model.drive_source]
     if column not in have:
-        others = [source for source, key in REFERENCE_COLUMNS.items() if key in have]
+        remedies = [reference_remedy({**recording.extra, **have}, column)]
+        remedies += [
+            f"set source = {key!r} in the twin's [drive]" for key, one in REFERENCE_COLUMNS.items() if one in have
+        ]
+        remedies = [one for one in remedies if one][:2]
         raise InputError(
             f"{name}: column {column} is missing, but the twin's drive source is {model.drive_source!r}; "
             + (
-                f"set source = {others[0]!r} in the twin's [drive]"
-                if others
-                else "record a tachometer, angle or command, or of a linear axis its commanded place or speed"
+                ", or ".join(remedies)
+                or "record a tachometer, angle or command, or of a linear axis its commanded place or speed"
             )
         )
     if model.drive_source == "carriage_acceleration":

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 
 from gfimu.diagnosis.report.rig import DrawnRig
@@ -13,7 +13,7 @@ from gfimu.files.atomic_file import atomic_folder
 from gfimu.files.outputs import OutputFolder, check_outputs
 from gfimu.optional_packages import install_command, missing, packages_of
 
-__all__ = ["FILES", "check_folder", "files_to_write", "warn_of_omitted", "write_diagnosis"]
+__all__ = ["FILES", "check_folder", "files_of", "files_to_write", "warn_of_omitted", "write_diagnosis"]
 
 FILES: Mapping[str, str] = {
     "verdict.json": "verdict",
@@ -31,6 +31,20 @@ def files_to_write() -> dict[str, str]:
     """Return what the folder will hold with the packages that are installed, as `FILES`."""
     absent = missing(*_NEEDS.values())
     return {name: meaning for name, meaning in FILES.items() if _NEEDS.get(name) not in absent}
+
+
+def files_of(diagnosis: Diagnosis, more: Collection[str] = ()) -> dict[str, str]:
+    """Return all files of a diagnosis's folder, as `FILES`: with those that its twin file names.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        The diagnosis.
+    more : collection of str
+        Names of further text files that the twin file names.
+    """
+    parts = {name: f"part {Path(name).stem}" for name in diagnosis.twin.array.part_files}
+    return files_to_write() | parts | {name: Path(name).stem for name in more}
 
 
 def warn_of_omitted() -> None:
@@ -96,7 +110,7 @@ def write_diagnosis(
         # Part files of the user's are named by the twin or its array, and looked up beside them.
         for name, text in {**diagnosis.twin.array.part_files, **(more or {})}.items():
             (made / name).write_text(text, encoding="utf-8")
-        files = files_to_write()
+        files = files_of(diagnosis, more or ())
         if "report.html" in files:
             from gfimu.diagnosis.report.page import write_report
 

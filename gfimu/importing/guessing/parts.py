@@ -24,6 +24,7 @@ __all__ = [
     "chip_part",
     "force_of",
     "gyro_part",
+    "known_reference",
     "other_references",
     "reason",
     "single_axes",
@@ -133,7 +134,7 @@ def other_references(table: RawTable, taken: Collection[str]) -> Part:
     found: dict[str, ColumnSpec] = {}
     reasons = []
     for name in table.columns:
-        known = _known_reference(name)
+        known = known_reference(name)
         if known is None or name in taken or known[0] in found or table.columns[name].dtype == object:
             continue
         key, unit = known
@@ -144,8 +145,8 @@ def other_references(table: RawTable, taken: Collection[str]) -> Part:
     return Part(found, roles, tuple(reasons))
 
 
-def _known_reference(name: str) -> tuple[str, str] | None:
-    """Return the reference that a column is by its name, and its unit; None if it is none."""
+def known_reference(name: str) -> tuple[str, str] | None:
+    """Return the reference that a column is by its name, and its unit or the usual one; None if it is none."""
     plain, unit = unit_of_name(name.lower())
     if _OTHER_QUANTITY.search(plain) or (not unit and re.search(r"[\[(].*[\])]\s*$", plain)):
         return None

@@ -33,6 +33,7 @@ from gfimu.importing.splitting import find_split, split_file
 
 __all__ = ["Suggestion", "roles_by_map", "suggest", "with_shipped"]
 
+_UNNAMED = {"text", "table"}  # formats that a map does not name: that of most files, and a table in memory
 _DIFFERENT = 0.1  # relative, by which numbers and a map may differ: gains of parts
 _EPOCH = (1e9, 4e9)  # s since 1970, from 2001 to 2096
 
@@ -150,7 +151,7 @@ def suggest(raw: RawFile, *, table: str = "", name: str = "map", text: TextSpec 
             reference=reference,
             text=_layout(chosen, text),
             table=chosen.name if len(raw.tables) > 1 else "",
-            format="" if raw.format == "text" else raw.format,
+            format="" if raw.format in _UNNAMED else raw.format,
             split_by=split_by or "",
             skip_rows=skipped,
             missing=missing,

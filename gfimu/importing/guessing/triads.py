@@ -13,7 +13,7 @@ from gfimu.importing.guessing.units import rest_windows, sphere_of, triad_values
 from gfimu.importing.notation import kind_of, unit_of_name
 from gfimu.importing.raw_table import RawTable
 
-__all__ = ["Triad", "find_triads", "is_acceleration"]
+__all__ = ["Triad", "find_triads", "is_acceleration", "is_rate"]
 
 _STRONG = re.compile(r"acc|force|adxl|mma\d|lis\d|bma\d|kx\d|kxrb", re.IGNORECASE)
 _WEAK = re.compile(r"^a[xyz_\d\[ ]|_a_|^a_", re.IGNORECASE)
@@ -175,6 +175,14 @@ def is_acceleration(name: str) -> bool:
     if _NEITHER.search(plain) or _GYRO.search(plain):
         return False
     return kind_of(unit) == "acceleration" if unit else bool(_STRONG.search(plain) or _SINGLE.match(plain))
+
+
+def is_rate(name: str) -> bool:
+    """Whether a column is an angular rate by its unit or its name."""
+    plain, unit = unit_of_name(name)
+    if _NEITHER.search(plain):
+        return False
+    return kind_of(unit) == "rate" if unit else bool(_GYRO.search(plain))
 
 
 def _short(name: str) -> str:

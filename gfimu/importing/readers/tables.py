@@ -15,12 +15,13 @@ from numpy.typing import NDArray
 
 from gfimu.errors import InputError
 from gfimu.files.input_file import parsing
+from gfimu.files.table_columns import TableColumns
 from gfimu.importing.column_map import TextSpec
 from gfimu.importing.raw_table import RawFile, RawTable
 from gfimu.importing.readers.text import table_of_text
 from gfimu.optional_packages import require
 
-__all__ = ["arrow_table", "gather", "read_archive", "read_hdf5", "read_parquet", "tables_by_length"]
+__all__ = ["arrow_table", "gather", "read_archive", "read_hdf5", "read_parquet", "table_file", "tables_by_length"]
 
 _MOST_UNPACKED = 64 << 20  # bytes that any archive may unpack to
 _MOST_PACKED = 25  # bytes from one packed byte
@@ -47,6 +48,19 @@ def arrow_table(table: pa.Table) -> RawTable:
         else:
             columns[name] = np.array(column.to_pylist(), dtype=object)
     return RawTable("", columns)
+
+
+def table_file(source: Any) -> RawFile:
+    """Return a table object of pandas, polars or pyarrow as a file of one table.
+
+    Raises
+    ------
+    InputError
+        If it is no such table, has a column without a name, or repeats one.
+    """
+    name = TableColumns(source).file
+    table = pa.Table.from_pandas(source) if hasattr(source, "reset_index") else pa.table(source)
+    return RawFile(name, "table", {"": arrow_table(table)})
 
 
 def read_archive(path: Path, text: TextSpec = TextSpec()) -> RawFile:

@@ -48,7 +48,8 @@ def gather(recording: Recording, array: AccelerometerArray, limits: PartLimits, 
     longest = sorted(sorted(rests, key=lambda rest: rest.start - rest.stop)[:_RESTS], key=lambda rest: rest.start)
     means = np.array([readings[rest][whole[rest]].mean(axis=0) for rest in longest]).reshape(-1, array.n_channels)
     windows = _windows(recording, readings[:, alive], whole, rests)
-    return Evidence(array, alive, limits, means, covariance, windows, up, _quiet(readings), recording.sample_rate)
+    quiet, rate = _quiet(readings), recording.sample_rate
+    return Evidence(array, alive, limits, means, covariance, windows, up, quiet, rate, recording.unit_from)
 
 
 def _rests(

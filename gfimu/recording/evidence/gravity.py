@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gfimu.geometry.array import AccelerometerArray
 from gfimu.parts.limits import PartLimits
+from gfimu.recording.evidence.ways import unit_remedy
 from gfimu.recording.recording import Recording
 from gfimu.units import STANDARD_GRAVITY
 
@@ -57,13 +58,14 @@ def gravity_text(recording: Recording, array: AccelerometerArray, limits: PartLi
         seen = f"the specific force of chip {chip.name} is {size:.3g} m/s² (rms) where it is least"
         if size > most:
             in_mg = size * 1e-3 * STANDARD_GRAVITY > least
-            cause = "it looks like mg: name the columns …_mg, or give the unit by --map" if in_mg else "check the unit"
+            remedy = unit_remedy(recording.unit_from, "mg", "…_mg")
+            cause = f"it looks like mg: {remedy}" if in_mg else "check the unit"
             return f"{seen}, beyond the range of its part; {cause}", True
         if size >= least:
             continue
         if _ONE_G[0] < size < _ONE_G[1] or _TURNING_G[0] < turning < _TURNING_G[1]:
             how = f", and gravity turns in it by {turning:.3g} m/s²" if size >= _ONE_G[1] else ""
-            cause = "the file looks like it is in g: name the columns …_g, or give the unit by --map"
+            cause = f"it looks like it is in g: {unit_remedy(recording.unit_from, 'g', '…_g')}"
             return f"{seen}{how}; gravity alone is 9.81: {cause}", True
         if size < _NO_GRAVITY:
             cause = "it has been taken out of the file; export the specific force, not the linear acceleration"

@@ -181,6 +181,8 @@ class Evidence:
         Noise seen between neighbouring samples where they are quietest, m/s².
     sample_rate : float
         By the times as given, Hz.
+    unit_from : str
+        Which argument stated the unit of the readings (`gfimu.Recording`).
     """
 
     array: AccelerometerArray
@@ -192,6 +194,7 @@ class Evidence:
     up: NDArray[np.float64] | None
     quiet: NDArray[np.float64]
     sample_rate: float
+    unit_from: str = ""
     _cache: dict[str, Matrices] = field(default_factory=dict)
 
     @property

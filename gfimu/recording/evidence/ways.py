@@ -13,7 +13,7 @@ from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording.evidence.rigid import Evidence, Otherwise
 from gfimu.units import STANDARD_GRAVITY
 
-__all__ = ["TIME_UNITS", "both_ways", "time_text", "ways_to_read"]
+__all__ = ["TIME_UNITS", "both_ways", "time_text", "unit_remedy", "ways_to_read"]
 
 _ORDER = ("time", "unit", "chip_unit", "sign", "exchange", "array")
 
@@ -24,6 +24,31 @@ TIME_UNITS = {1e-3: "milliseconds", 1e-6: "microseconds"}
 def time_text(unit: str, factor: float, reason: str) -> str:
     """Say in which unit of time a column is, why, and what to do."""
     return f"column t_s is in {unit}: {reason}; multiply it by {factor:g}"
+
+
+def unit_remedy(unit_from: str, unit: str, columns: str, *, some: bool = False) -> str:
+    """Return how to state another unit of readings, where it was stated first; empty if it can't be stated there.
+
+    Parameters
+    ----------
+    unit_from : str
+        Which argument stated it; empty for the names of the columns (`gfimu.Recording`).
+    unit : {"g", "mg", "lsb"}
+        The unit.
+    columns : str
+        The columns by the names that they need.
+    some : bool
+        Whether other readings keep their unit.
+    """
+    if unit_from == "column_map":
+        where = f"for {columns.replace(f'_{unit}', '')} " if some else ""
+        return f'set unit = "{unit}" {where}in the column map' if unit != "lsb" else ""
+    if unit_from == "unit":
+        fits = not some and unit != "lsb"  # one unit for all, and counts stay counts
+        return f'give unit="{unit}" to gfimu.Recording.from_arrays' if fits else ""
+    if unit_from == "units" and not some:
+        return f'give units="{unit}" to gfimu.Recording.from_table'
+    return f"name the column{'s' if ',' in columns or '…' in columns else ''} {columns}"
 
 
 def ways_to_read(evidence: Evidence) -> list[Otherwise]:
@@ -50,15 +75,15 @@ def ways_to_read(evidence: Evidence) -> list[Otherwise]:
         "mm/s²": ("", np.full(count, 0.001)),
     }
     for unit, (suffix, scale) in units.items():
-        remedy = f"name the columns {names[0]}{suffix} …" if suffix else f"multiply them by {scale[0]:g}"
+        remedy = unit_remedy(evidence.unit_from, suffix[1:], f"{names[0]}{suffix} …") if suffix else ""
+        remedy = remedy or f"multiply them by {scale[0]:g}"
         rest = evidence.gravity_at_rest(evidence.as_given())
         seen = f"gravity reads {np.median(rest):.4g} at rest" if len(rest) else "the motion fits no other unit"
         ways.append(Otherwise("unit", f"all readings are in {unit}, not in m/s²: {seen}; {remedy}", np.diag(scale)))
         for who, channels in _some_channels(array):
             columns = ", ".join(f"{name}{suffix}" for name in channels)
-            cure = f"name it {columns}" if suffix else f"multiply it by {scale[0]:g}"
-            if len(channels) > 1:
-                cure = f"name its columns {columns}" if suffix else f"multiply its columns by {scale[0]:g}"
+            cure = unit_remedy(evidence.unit_from, suffix[1:], columns, some=True) if suffix else ""
+            cure = cure or f"multiply {'its columns' if len(channels) > 1 else 'it'} by {scale[0]:g}"
             text = f"{who} reads in {unit}, the others in m/s²; {cure}"
             mine = np.isin(names, channels)
             ways.append(Otherwise("chip_unit", text, np.diag(np.where(mine, scale, 1.0)), channels=channels))

@@ -171,7 +171,6 @@ def test_units_are_read_as_people_write_them():
 
 
 def test_a_recording_of_gfimus_is_known_and_its_repeated_rows_are_said(tmp_path):
-    import gfimu
 
     rows = [f"{k / 100},{k % 5},{k % 3},{9.8 + 0.01 * (k % 4)},{k}" for k in range(300)]
     path = tmp_path / "run.csv"
@@ -191,9 +190,3 @@ def test_times_that_go_back_are_no_counter_that_starts_anew(tmp_path):
     assert inspect_file(text_run(tmp_path, t)).column_map.time.wrap is None
     counts = (65000 + 10 * np.arange(files.N)) % 65536
     assert inspect_file(text_run(tmp_path, counts)).column_map.time.wrap == 65536.0
-
-
-def test_a_table_in_memory_is_refused_with_what_takes_it():
-    table = pytest.importorskip("pandas").DataFrame({"time": [0.0, 0.01], "ax": [0.0, 0.1]})
-    with pytest.raises(InputError, match=r"not a DataFrame: .* gfimu\.Recording\.from_table"):
-        gfimu.inspect(table)

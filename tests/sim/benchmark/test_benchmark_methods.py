@@ -9,10 +9,11 @@ import gfimu
 from gfimu.errors import InputError
 from sim.benchmark import baselines
 from sim.benchmark.answer import answer_of, read_answers
+from sim.benchmark.baselines import BASELINES
 from sim.benchmark.baselines.best_single import _log_tail
 from sim.benchmark.judge import judge
 from sim.benchmark.library import LinearLibrary, stated_parameters
-from sim.benchmark.methods import BASELINES, answer_task, load_method
+from sim.benchmark.methods import answer_task, load_method
 from sim.benchmark.truth_file import fixed_world, task_of, truths
 from sim.effects import EFFECTS
 

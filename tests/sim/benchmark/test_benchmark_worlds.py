@@ -8,9 +8,9 @@ import pytest
 from sim.benchmark.drawing import draw, effects_of, fresh_motion
 from sim.benchmark.generators.foreign_effects import FOREIGN
 from sim.benchmark.generators.independent_effects import DRAWS, EXOTICS
-from sim.benchmark.release import RELEASE, SETS, SPLITS, cases, find_case
+from sim.benchmark.release import RELEASE, SETS, SPLITS, cases, find_case, release_hash
 from sim.benchmark.ties import LEAST_SEPARABLE, free_distance_and_ties
-from sim.benchmark.truth_file import LEAST_VISIBLE, digest_of, fixed_world, make, release_hash, task_of, truths
+from sim.benchmark.truth_file import LEAST_VISIBLE, digest_of, fixed_world, make, task_of, truths
 from sim.benchmark.unlisted import PLACES, UNLISTED_TRUTH
 from sim.effects import EFFECTS, TABLE_EFFECTS
 
