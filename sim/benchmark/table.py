@@ -33,9 +33,6 @@ _SHARES = {
 }
 """Outcomes that each share counts, of worlds with something hidden."""
 
-MEASURED_OUTCOMES = frozenset({"measured", "contradicted"})
-"""Outcomes of measured data, which have no truth to share in."""
-
 _LEVEL = 0.95
 _WORSE = -0.05  # of the removed share, from which an answer predicts worse than the given simulation
 
@@ -91,7 +88,7 @@ class Summary:
 
     def share(self, *outcomes: str, nothing: bool | None = False) -> Share:
         """Return the share of outcomes among worlds with something hidden, with nothing, or (None) all."""
-        drawn = [one for one in self.judged if one.outcome not in MEASURED_OUTCOMES]
+        drawn = [one for one in self.judged if np.isfinite(one.points)]  # measured data have no truth and no points
         chosen = [one for one in drawn if nothing is None or _is_nothing(one) == nothing]
         return Share(sum(one.outcome in outcomes for one in chosen), len(chosen))
 

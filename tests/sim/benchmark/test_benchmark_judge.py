@@ -5,7 +5,7 @@ import pytest
 
 from gfimu.errors import InputError
 from sim.benchmark.answer import Answer, CauseAnswer, ParameterAnswer, answer_of
-from sim.benchmark.judge import POINTS, claims_of, judge, outcome_of
+from sim.benchmark.judge import POINTS, Judged, claims_of, judge, outcome_of
 from sim.benchmark.judged_file import read_judged, write_judged
 from sim.benchmark.table import Share, summaries
 from sim.benchmark.truth_file import Fixed, fixed_world, truths
@@ -210,3 +210,9 @@ def test_a_summary_counts_worlds_with_and_without_something_hidden_apart():
     assert own.share("unknown") == Share(hidden, hidden)
     assert own.share("false_alarm", nothing=True) == Share(0, 6 - hidden)
     assert own.points[0] == 0.25
+
+
+def test_a_method_that_fails_on_measured_data_has_no_share_there():
+    failed = Judged("real/test/000", "mine", (), ("error",), "error", float("nan"))
+    (summary,) = (one for one in summaries([failed]) if one.set_name == "real")
+    assert {share.cases for share in summary.shares.values()} == {0}
