@@ -114,7 +114,7 @@ def _optimize(
         _print_front(result)
     else:
         _print_result(result)
-    print_paths((f"the {what}", path) for what, path in files.items())
+    print_paths(files.items())
 
 
 def _print_result(result: SearchResult) -> None:

@@ -41,7 +41,7 @@ def test_a_brief_with_sites_gives_array_picture_and_certificate(gfimu_command, h
     assert result.code == 0, result.stderr
     assert "2 of 2 starts agree on it" in result.stdout
     assert "certificate: optimal, equal to a proven bound, 1.0607" in result.stdout
-    assert "wrote the picture: best.png" in result.stdout
+    assert "wrote picture: best.png" in result.stdout
     assert has_ink(here / "best.png")
     np.testing.assert_allclose(np.abs(AccelerometerArray.load("best.toml").chip_positions), 0.05)
 

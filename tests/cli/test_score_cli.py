@@ -69,7 +69,7 @@ def test_optimize_writes_an_array_that_score_reads(gfimu_command, tmp_path):
     out = tmp_path / "best4.toml"
     result = gfimu_command("optimize", "--chips", 4, "--restarts", 6, "--out", out)
     assert result.code == 0
-    assert "wrote the array" in result.stdout
+    assert "wrote array" in result.stdout
     content = json.loads(gfimu_command("score", out, "--json").stdout)
     assert content["arrays"][0]["name"] == "best4"
     assert content["arrays"][0]["gdop"] == pytest.approx(1.0607, abs=5e-5)
