@@ -55,7 +55,8 @@ def slurm(tmp_path, monkeypatch):
         tool.chmod(0o755)
     monkeypatch.setenv("PATH", str(tools), prepend=os.pathsep)
     monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent), prepend=os.pathsep)  # of the work, for the jobs
-    size = {"cores": 1, "processes": 1, "memory": "1GiB", "walltime": "00:10:00"}
+    # A worker that starts on a busy machine may need longer than the minute after which it gives up by default.
+    size = {"cores": 1, "processes": 1, "memory": "1GiB", "walltime": "00:10:00", "death-timeout": 600}
     with dask.config.set({f"jobqueue.slurm.{key}": value for key, value in size.items()}):
         yield done
 
