@@ -329,7 +329,7 @@ def _decide(evidence: Evidence) -> list[Finding]:
     if not found:
         return []
     best = found[0]
-    # A mirrored way fits as well where two chips are each other's mirror image; the sign of the tachometer tells.
+    # A mirrored way fits as well where two chips are each other's mirror image; the sign of the tachometer decides.
     turned = {id(one): evidence.follows_tacho(one.way) for one in found if one.left < max(_AS_GOOD, _ALIKE * best.left)}
     if max(turned.values()) > _FOLLOWS:
         found = [one for one in found if turned.get(id(one), -1.0) > -_FOLLOWS]

@@ -234,16 +234,11 @@ def _slopes(
 
 def _rate_of(slopes: NDArray[np.float64], sensitivity: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
     """Return the vector w (3,) whose products fit the slopes (d,) best, and the share that it does not explain."""
-    best, left = np.zeros(3), 1.0
-    for start in rates_of(np.linalg.pinv(sensitivity, rcond=1e-6) @ slopes)[:1]:
-        w = start
-        for _ in range(_ITERATIONS):
-            slope = sensitivity @ product_slopes(w[None])[0]
-            w = w + np.linalg.lstsq(slope, slopes - sensitivity @ omega_products(w), rcond=1e-9)[0]
-        share = float(np.sum((slopes - sensitivity @ omega_products(w)) ** 2) / np.sum(slopes**2))
-        if share < left:
-            best, left = w, share
-    return best, left
+    w = rates_of(np.linalg.pinv(sensitivity, rcond=1e-6) @ slopes)[0]  # −w has the same products
+    for _ in range(_ITERATIONS):
+        slope = sensitivity @ product_slopes(w[None])[0]
+        w = w + np.linalg.lstsq(slope, slopes - sensitivity @ omega_products(w), rcond=1e-9)[0]
+    return w, float(np.sum((slopes - sensitivity @ omega_products(w)) ** 2) / np.sum(slopes**2))
 
 
 def _named(column: str, unit: str, ratio: tuple[float, float], span: float, policy: RatePolicy) -> OddRate | None:

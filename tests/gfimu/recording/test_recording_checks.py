@@ -320,7 +320,7 @@ def test_a_rest_bias_beyond_the_data_sheet_is_refused(table_run):
 
 @pytest.mark.parametrize(("one", "two"), [(0, 1), (0, 2)])
 def test_two_axes_exchanged_on_every_chip_are_named_by_the_tachometer(table_run, one, two):
-    """The cube's mirror image is itself with two chips exchanged: only the sign of the turning tells."""
+    """The cube's mirror image is itself with two chips exchanged: only the sign of the turning decides."""
     order = np.arange(12).reshape(4, 3)
     order[:, [one, two]] = order[:, [two, one]]
     rate = np.interp(
