@@ -1,6 +1,6 @@
 """How many faulty channels are found, and how many sound ones are excluded: the table of docs/theory/integrity.md.
 
-Run ``PYTHONPATH=tests/gfimu/integrity python benchmarks/channel_faults.py`` (10 min of processor time). The readings
+Run ``PYTHONPATH=tests/gfimu/rate/health python benchmarks/channel_faults.py`` (10 min of processor time). The readings
 are those of the tests (`watched_world`): ``cube12``, noise of the data sheet, gains 0.05 %, axes 0.5 mrad, places
 0.1 mm, onset at random within 2 s. Options: runs per cell, hours of each motion without a fault, and the first seed.
 """
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from watched_world import CALIBRATED, CUBE, GRAVITY, readings
 
-from gfimu.integrity import watch_channels
+from gfimu.rate.health import watch_channels
 
 MG = 1e-3 * GRAVITY
 MOTIONS = ("turn", "tumble", "rest")

@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Self
 
 from gfimu.diagnosis import diagnose
-from sim.study.cases import Case
-from sim.study.outcome import draw_world, processor_time
+from sim.trials.study.cases import Case
+from sim.trials.study.outcome import draw_world, processor_time
 
 _PERIOD = 0.2  # s
 

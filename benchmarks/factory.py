@@ -1,4 +1,4 @@
-"""How long a measured world of 40 s takes, by the factory and by `sim.worlds.hidden.measure`, in one run.
+"""How long a measured world of 40 s takes, by the factory and by `sim.trials.worlds.hidden.measure`, in one run.
 
 python benchmarks/factory.py [COUNT]
 """
@@ -16,9 +16,9 @@ from collections.abc import Callable  # noqa: E402
 
 import numpy as np  # noqa: E402
 
+from sim.trials.worlds.factory import WorldFactory  # noqa: E402
+from sim.trials.worlds.hidden import measure  # noqa: E402
 from sim.twin import Twin  # noqa: E402
-from sim.worlds.factory import WorldFactory  # noqa: E402
-from sim.worlds.hidden import measure  # noqa: E402
 
 
 def main(count: int) -> None:

@@ -20,9 +20,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.geometry.dilution import gdop
-from gfimu.geometry.kinematics import closed_form, motion_from_readings, pseudo_inverse
+from gfimu.array.array import AccelerometerArray
+from gfimu.array.dilution import gdop
+from gfimu.array.kinematics import closed_form, motion_from_readings, pseudo_inverse
 
 ROUNDS = 7
 GEOMETRIES = 100_000

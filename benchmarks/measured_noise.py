@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
+from gfimu.array.array import AccelerometerArray
 from gfimu.calibration.array_calibration import calibrate_array
-from gfimu.geometry.array import AccelerometerArray
 from gfimu.rate.methods import estimate_rate
 from gfimu.rate.sensing import SensorErrors
 from gfimu.recording.mimu4444 import read_mimu4444

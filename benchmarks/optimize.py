@@ -13,12 +13,12 @@ import time
 import numpy as np
 import scipy.optimize
 
+from gfimu.array.array import AccelerometerArray
 from gfimu.array_search.objectives import Conditions, objective
 from gfimu.array_search.problem import Problem, rows_of
+from gfimu.array_search.scoring import score
 from gfimu.array_search.search import search
 from gfimu.array_search.shapes import box, cylinder, frames_across, sphere
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.geometry.scoring import score
 
 PROBLEMS = {
     "4 triads, cube": Problem(4, 3, box((0.1, 0.1, 0.1))),

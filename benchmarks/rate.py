@@ -27,8 +27,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "gfimu" /
 from rate_worlds import Motion, cube, first_rest, measure, rms, sensor_errors, tumble, turntable
 from reference_filter import reference_filter
 
-from gfimu.bounds.posterior import posterior_rate_bound
-from gfimu.bounds.sample import rate_bound
+from gfimu.rate.bounds.posterior import posterior_rate_bound
+from gfimu.rate.bounds.sample import rate_bound
 from gfimu.rate.kalman import FilterSettings, KalmanRateFilter
 from gfimu.rate.live import LiveRateFilter
 from gfimu.rate.methods import RATE_METHODS, estimate_rate

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.array.array import AccelerometerArray
 from sim import forward
 from sim.motions.profiles import Tumble, speed_sweep, spin_profile
 from sim.rigs.driven import drive

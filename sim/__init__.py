@@ -1,5 +1,6 @@
 """The world: a turntable with a cube, its sensors, and everything that can go wrong in it.
 
-A `scenarios.Scenario` is a `world` that moves (`motions`, `rigs`) and is measured (`chips`); `simulation` makes its
-recording. A `twin` is what a diagnosis believes of it, `forward` the analytic prediction of both.
+In: a scenario, ``models/``.
+Out: recordings with their truth (`simulation`); a `twin`, what a diagnosis believes of the world, predicted by
+`forward` in closed form.
 """

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.geometry.kinematics import omega_products
+from gfimu.array.kinematics import omega_products
 from gfimu.motion.body_drive import BodyDrive
 from sim.motions.motion import SpinState
 from sim.world import SampleContext, World

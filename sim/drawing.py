@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.visual.colours import chip_colour
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.results.colours import chip_colour
 from gfimu.visual.rig import is_cube, stand_height
 from gfimu.visual.scene import Box, Cylinder, Mesh, Shape
 from sim.rigs.rig_model import turntable_model

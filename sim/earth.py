@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.geometry.kinematics import omega_products, specific_force
+from gfimu.array.array import AccelerometerArray
+from gfimu.array.kinematics import omega_products, specific_force
 from sim.motions.motion import BodyState
 
 __all__ = ["earth_in_body", "earth_readings"]

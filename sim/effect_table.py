@@ -6,9 +6,9 @@ from typing import Annotated, Any
 
 import msgspec
 
-from gfimu.errors import InputError
-from gfimu.files.schema import Table, about
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import InputError
+from gfimu.base.files.schema import Table, about
 from sim.effects import Effect, make_effect
 
 __all__ = ["EffectTable"]

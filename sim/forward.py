@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from gfimu.world_model import SpinState
+from gfimu.model.world_model import SpinState
 from sim.motions.motion import SpinMotion
 from sim.world import Nod, SampleContext, World
 
@@ -45,7 +45,7 @@ class TableGeometry:
     tangential : ndarray, shape (c, 3)
         r × θ: reading per angular acceleration, m; on a linear axis reading per acceleration along it, last column.
     centripetal : ndarray, shape (c, 6)
-        Reading per product of the angular rate, m (`gfimu.geometry.array.OMEGA_PRODUCTS`).
+        Reading per product of the angular rate, m (`gfimu.array.array.OMEGA_PRODUCTS`).
     up : ndarray, shape (3,)
         The world's up in the frame of the tilted axis.
     places : ndarray, shape (c, 3)

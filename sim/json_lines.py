@@ -7,9 +7,9 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from gfimu.errors import InputError
-from gfimu.files.atomic_file import atomic_path
-from gfimu.files.input_file import is_ordinary
+from gfimu.base.errors import InputError
+from gfimu.base.files.atomic_file import atomic_path
+from gfimu.base.files.input_file import is_ordinary
 
 __all__ = ["read_lines", "six_digits", "write_lines"]
 

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from gfimu import world_model
-from gfimu.errors import InputError
+from gfimu.base.errors import InputError
+from gfimu.model import world_model
 from sim import forward
 from sim.chips.adxl345 import Sensor, conversion_offsets
 from sim.chips.data_sheet import DataSheet

@@ -10,13 +10,13 @@ from typing import Annotated, Any, Literal
 import msgspec
 import numpy as np
 
-from gfimu.errors import InputError
-from gfimu.files.model_files import find_model, read_toml
-from gfimu.files.schema import NotNegative, Positive, Table, Triple, about, read
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.geometry.gravity import local_gravity
+from gfimu.array.array import AccelerometerArray
+from gfimu.array.gravity import local_gravity
+from gfimu.base.errors import InputError
+from gfimu.base.files.model_files import find_model, read_toml
+from gfimu.base.files.schema import NotNegative, Positive, Table, Triple, about, read
+from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.motion.earth import EarthRotation
-from gfimu.units import STANDARD_GRAVITY
 from sim.chips.adxl345 import SensorSettings
 from sim.chips.data_sheet import DataSheet
 from sim.effect_table import EffectTable

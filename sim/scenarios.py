@@ -9,13 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from gfimu.errors import InputError
-from gfimu.files.keys import set_key
-from gfimu.files.model_files import find_model, read_toml
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import InputError
+from gfimu.base.files.model_files import find_model, read_toml, set_key
+from gfimu.base.short_repr import short_repr
+from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.motion.earth import EarthRotation
-from gfimu.short_repr import short_repr
-from gfimu.units import STANDARD_GRAVITY
 from sim.chips.adxl345 import SensorSettings
 from sim.effects import NOT_OF_A_CARRIAGE, Effect, apply_effects
 from sim.effects.unlisted import Unlisted

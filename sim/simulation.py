@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-import gfimu
-from gfimu import world_model
-from gfimu.errors import InputError
+from gfimu.base.declared import Declared, Table, figure
+from gfimu.base.errors import InputError
+from gfimu.base.version import __version__
+from gfimu.model import world_model
 from gfimu.recording import Recording
 from gfimu.recording.carried_array import array_metadata
 from sim import forward
@@ -28,8 +29,10 @@ from sim.scenarios import Scenario
 from sim.truth import cube_state, truth_columns
 from sim.world import SampleContext, World
 
-__all__ = ["simulate", "summarise"]
+__all__ = ["Simulated", "memory_of", "simulate", "summarise"]
 
+_PER_SAMPLE, _PER_READING = 250, 80  # numerical: bytes of memory, measured: 950 to 1150 a sample of twelve channels
+_PER_STEP = 64  # numerical: the same of a step of the driven table
 _BLOCK = 20_000  # samples between two reports of progress
 
 
@@ -107,23 +110,60 @@ def simulate(
     return recording
 
 
-def summarise(scenario: Scenario, recording: Recording) -> dict[str, Any]:
-    """Return what a person wants to know of a simulated recording, by quantity with unit."""
+def memory_of(run: Scenario) -> float:
+    """Return the memory that a simulation needs, bytes."""
+    steps = run.duration / run.physics_step if run.driven else 0.0
+    return run.duration * run.sample_rate * (_PER_SAMPLE + _PER_READING * run.array.n_channels) + steps * _PER_STEP
+
+
+@dataclass(frozen=True)
+class Simulated(Declared):
+    """A simulated recording."""
+
+    recording: Recording
+    description: str
+    scenario: Annotated[str, figure("Name of the scenario.")]
+    seed: Annotated[int, figure("Seed of all random numbers.", head="seed")]
+    samples: Annotated[int, figure("Samples.", head="samples")]
+    duration_s: Annotated[float, figure("Length.", "s", head="duration", form=".2f")]
+    sample_rate_hz: Annotated[float, figure("Sample rate.", "Hz", head="sample rate", form="g")]
+    array: Annotated[str, figure("Name of the array.", head="array")]
+    channels: Annotated[tuple[str, ...], figure("Channels.")]
+    drive: Annotated[str, figure("What moves the body, in words.", head="motion")]
+    effects: Annotated[tuple[str, ...], figure("Effects that were simulated.", head="effects")]
+    peak_rate_rad_s: Annotated[float, figure("Fastest turn.", "rad/s", head="fastest turn", form=".3f")]
+    peak_reading_m_s2: Annotated[float, figure("Largest reading.", "m/s²", head="largest reading", form=".2f")]
+
+    @property
+    def n_channels(self) -> Annotated[int, figure("Channels.", head="channels", in_json=False, before="drive")]:
+        """Number of channels."""
+        return len(self.channels)
+
+    def shown(self) -> Iterator[Table]:
+        """Yield the table that people read."""
+        no_effects = [] if self.effects else [("effects", "none")]
+        yield Table(self.scenario, ("quantity", "value"), [*self.facts(), *no_effects], self.description)
+
+
+def summarise(scenario: Scenario, recording: Recording) -> Simulated:
+    """Return a simulated recording with what a person wants to know of it."""
     rates = np.stack([recording.extra[f"truth_omega_{axis}_rad_s"] for axis in "xyz"])
     lsb = recording.metadata["lsb_m_s2"] if recording.unit == "lsb" else 1.0
-    return {
-        "scenario": scenario.name,
-        "seed": recording.metadata["seed"],
-        "samples": len(recording),
-        "duration_s": recording.duration,
-        "sample_rate_hz": scenario.sample_rate,
-        "array": scenario.array.name,
-        "channels": list(recording.channels),
-        "drive": _drive_name(scenario),
-        "effects": [effect.name for effect in scenario.effects],
-        "peak_rate_rad_s": float(np.linalg.norm(rates, axis=0).max()),
-        "peak_reading_m_s2": float(np.nanmax(np.abs(recording.readings)) * lsb),
-    }
+    return Simulated(
+        recording,
+        scenario.description,
+        scenario.name,
+        recording.metadata["seed"],
+        len(recording),
+        recording.duration,
+        scenario.sample_rate,
+        scenario.array.name,
+        recording.channels,
+        _drive_name(scenario),
+        tuple(effect.name for effect in scenario.effects),
+        float(np.linalg.norm(rates, axis=0).max()),
+        float(np.nanmax(np.abs(recording.readings)) * lsb),
+    )
 
 
 def _drive_name(scenario: Scenario) -> str:
@@ -229,7 +269,7 @@ def _metadata(run: Scenario, sensor: Sensor, seed: int) -> dict[str, Any]:
         "sample_rate_hz": run.sample_rate,
         "scenario": run.name,
         "seed": seed,
-        "software_version": gfimu.__version__,
+        "software_version": __version__,
         "mounting_rotvec_rad": list(run.mounting_rotvec),
         **run.place,
         **_rig_axis(run),

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from gfimu.errors import InputError
+from gfimu.base.errors import InputError
+from gfimu.model.world_model import SpinState
 from gfimu.recording import Recording
-from gfimu.world_model import SpinState
 from sim.forward import nodding_motion
 from sim.motions.motion import BodyState
 from sim.world import World

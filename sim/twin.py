@@ -14,17 +14,17 @@ import tomli_w
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from gfimu.errors import InputError
-from gfimu.files.model_files import find_model, read_toml
-from gfimu.files.schema import read
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.geometry.turning_axis import TurningAxis
+from gfimu.array.array import AccelerometerArray
+from gfimu.array.parts.part_file import PartFile
+from gfimu.array.turning_axis import TurningAxis
+from gfimu.base.errors import InputError
+from gfimu.base.files.model_files import find_model, read_toml
+from gfimu.base.files.schema import read
+from gfimu.base.short_repr import short_repr
+from gfimu.base.units import STANDARD_GRAVITY
+from gfimu.model.world_model import BasisUnits, BodyModel, EffectFamily, ExpectedNoise, Spin, is_linear, reads_place
+from gfimu.model.world_model import Effect as AnyEffect
 from gfimu.motion.body_drive import BodyDrive
-from gfimu.parts.part_file import PartFile
-from gfimu.short_repr import short_repr
-from gfimu.units import STANDARD_GRAVITY
-from gfimu.world_model import BasisUnits, BodyModel, EffectFamily, ExpectedNoise, Spin, is_linear, reads_place
-from gfimu.world_model import Effect as AnyEffect
 from sim import forward
 from sim.body import body_channels
 from sim.effects import (
@@ -78,7 +78,7 @@ class Twin:
         Array as named in the file.
     grammar : bool
         Whether a diagnosis searches the further effects of a rig and the points of the grammar at once; otherwise it
-        does so where the usual effects give no good answer.
+        does so where the evidence asks for it.
     axis_inclination : float
         Angle between the table's axis and the vertical, rad: 0 of a level table, π/2 of a wheel or a pendulum. The
         axis leans about the world's x axis; at the angle zero that is the table's x axis too.

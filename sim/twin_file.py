@@ -7,9 +7,9 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from gfimu.files.schema import Positive, Table, Triple, about
-from gfimu.geometry.array_file import MountingTable
-from gfimu.units import STANDARD_GRAVITY
+from gfimu.array.array_file import MountingTable
+from gfimu.base.files.schema import Positive, Table, Triple, about
+from gfimu.base.units import STANDARD_GRAVITY
 from sim.effect_table import EffectTable
 
 __all__ = ["Inclination", "TwinDriveTable", "TwinFile", "TwinSensorTable"]

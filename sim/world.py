@@ -19,11 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.geometry.turning_axis import TurningAxis
-from gfimu.short_repr import short_repr
-from gfimu.units import STANDARD_GRAVITY
-from gfimu.world_model import SpinState
+from gfimu.array.array import AccelerometerArray
+from gfimu.array.turning_axis import TurningAxis
+from gfimu.base.short_repr import short_repr
+from gfimu.base.units import STANDARD_GRAVITY
+from gfimu.model.world_model import SpinState
 from sim.motions.motion import SpinMotion
 
 __all__ = ["DataStep", "Lean", "MotionStep", "Nod", "ReferenceStep", "SampleContext", "SensingStep", "Shake", "World"]

@@ -2,7 +2,9 @@
 
 import os
 import sys
+from collections import defaultdict
 from collections.abc import Callable
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
@@ -18,6 +20,9 @@ if _share and hasattr(os, "sched_setaffinity"):
     _processors = sorted(os.sched_getaffinity(0))
     _number, _count = int(_share.removeprefix("gw")), int(os.environ["PYTEST_XDIST_WORKER_COUNT"])
     os.sched_setaffinity(0, _processors[_number::_count] or {_processors[_number % len(_processors)]})
+
+# The lot by which a run draws what it tries of a long list: the test processes share it, and setting it draws it again.
+LOT = os.environ.setdefault("GFIMU_LOT", datetime.now(UTC).date().isoformat())
 
 settings.register_profile("gfimu", deadline=None, derandomize=True, max_examples=50)
 settings.load_profile("gfimu")
@@ -72,13 +77,24 @@ def made_once(tmp_path_factory) -> Callable[[str, Callable[[], str]], str]:
     return text
 
 
-SLOW_TESTS = frozenset((PROJECT_ROOT / "tests" / "slow_tests.txt").read_text(encoding="utf-8").splitlines())
-"""Tests by their names in full that run as studies, so that the usual run ends within minutes."""
+def pytest_terminal_summary(terminalreporter):
+    """Print what draws the same lot again."""
+    terminalreporter.write_line(f"lot: GFIMU_LOT={LOT}")
 
 
 @pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark the slow tests as studies, before markers are selected by."""
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave in the usual suite what the marker ``study`` of a function leaves there, before markers are selected by."""
+    cases, listed = defaultdict(set), {}
     for item in items:
-        if item.nodeid in SLOW_TESTS:
-            item.add_marker(pytest.mark.study)
+        mark = item.get_closest_marker("study")
+        if mark is None or not mark.kwargs:
+            continue
+        test, case = item.nodeid.partition("[")[0], item.callspec.id
+        cases[test].add(case)
+        listed[test] = {one for names in mark.kwargs.values() for one in names}
+        if case in mark.kwargs.get("but", ()) or case not in mark.kwargs.get("only", (case,)):
+            item.own_markers = [one for one in item.own_markers if one.name != "study"]
+    if not any("::" in one for one in config.args):  # otherwise not all cases are here
+        absent = {test: sorted(listed[test] - cases[test]) for test in listed if listed[test] - cases[test]}
+        assert not absent, f"marked study for cases that are not there: {absent}"

@@ -113,9 +113,9 @@ def write_inputs() -> None:
 
     from gfimu import AccelerometerArray, Recording
     from sim.effects import make_effect
+    from sim.trials.worlds.factory import WorldFactory
+    from sim.trials.worlds.hidden import Measurement
     from sim.twin import Twin
-    from sim.worlds.factory import WorldFactory
-    from sim.worlds.hidden import Measurement
 
     rng = np.random.default_rng(1)
     world = WorldFactory(Twin.load("cube12_turntable"), Measurement(duration=20.0))
@@ -134,7 +134,7 @@ def write_inputs() -> None:
 
 def call(arguments: str) -> tuple[int, str]:
     """Return the exit code of a call of the program, and all that it printed."""
-    from gfimu.cli import main
+    from gfimu.commands.shell.program import main
 
     printed = io.StringIO()
     sys.argv = ["gfimu", *arguments.split()]

@@ -18,19 +18,19 @@ import foreign_world
 import msgspec
 import numpy as np
 
+from gfimu.base.errors import GfimuError
+from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.diagnosis import diagnose
 from gfimu.diagnosis.data.prepared_runs import PreparedRuns
 from gfimu.diagnosis.fit.learn import predicted_by_reference
-from gfimu.errors import GfimuError
 from gfimu.recording import Recording
-from gfimu.units import STANDARD_GRAVITY
-from sim.benchmark.generators.foreign_effects import FOREIGN
-from sim.study.outcome import draw_world, outcome_of, processor_time
-from sim.sweep.dataset import Dataset
-from sim.sweep.engine import run_campaign
-from sim.sweep.executors import open_workers
-from sim.sweep.plan import PlanFile
-from sim.sweep.summary import failures
+from sim.trials.benchmark.generators.foreign_effects import FOREIGN
+from sim.trials.study.outcome import draw_world, outcome_of, processor_time
+from sim.trials.sweep.dataset import Dataset
+from sim.trials.sweep.engine import run_campaign
+from sim.trials.sweep.executors import open_workers
+from sim.trials.sweep.plan import PlanFile
+from sim.trials.sweep.summary import failures
 
 WORSE = 1.02  # of the prediction error of a new recording, from which a twin predicts worse
 

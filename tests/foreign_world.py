@@ -1,7 +1,8 @@
 """Foreign effects in worlds of the project's own simulation, besides those of MuJoCo's table.
 
-`hide_in_campaign` hides the effects of `sim.benchmark.generators.foreign_effects` in a world of `sim` and measures it
-as its campaign does, with the cube's movements computed in the turning frame. As a program it draws one case:
+`hide_in_campaign` hides the effects of `sim.trials.benchmark.generators.foreign_effects` in a world of `sim` and
+measures it as its campaign does, with the cube's movements computed in the turning frame. As a program it draws one
+case:
 
     python tests/foreign_world.py --seed 3 --size 500 --out DIR bench_sway
 """
@@ -15,11 +16,12 @@ from pathlib import Path
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.units import STANDARD_GRAVITY
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.units import STANDARD_GRAVITY
 from sim import forward
-from sim.benchmark.generators.foreign_effects import FOREIGN, Motion, acting, noise_free
-from sim.benchmark.generators.foreign_world import (
+from sim.motions.motion import SplineSpin
+from sim.trials.benchmark.generators.foreign_effects import FOREIGN, Motion, acting, noise_free
+from sim.trials.benchmark.generators.foreign_world import (
     TOP,
     draw_hidden,
     hide,
@@ -27,12 +29,11 @@ from sim.benchmark.generators.foreign_world import (
     new_recording,
     sample_times,
 )
-from sim.benchmark.generators.independent_table import INERTIA, LEAD
-from sim.benchmark.generators.independent_world import HiddenRun, Setting
-from sim.motions.motion import SplineSpin
-from sim.study.cases import Case
+from sim.trials.benchmark.generators.independent_table import INERTIA, LEAD
+from sim.trials.benchmark.generators.independent_world import HiddenRun, Setting
+from sim.trials.study.cases import Case
+from sim.trials.worlds.hidden import Measurement, measure, random_profile
 from sim.twin import Twin
-from sim.worlds.hidden import Measurement, measure, random_profile
 
 __all__ = ["CASES", "SIZES", "hide", "hide_in_campaign", "new_recording"]
 

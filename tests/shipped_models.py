@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from gfimu.files.model_files import list_models
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.parts.limits import PartLimits
-from gfimu.parts.part import Part
+from gfimu.array.array import AccelerometerArray
+from gfimu.array.parts.limits import PartLimits
+from gfimu.array.parts.part import Part
+from gfimu.base.files.model_files import list_models
 from sim.chips.data_sheet import DataSheet
 from sim.effects import Effect
 from sim.motions.motion import SplineSpin

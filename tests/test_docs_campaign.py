@@ -5,9 +5,9 @@ import struct
 
 import pytest
 
-from gfimu.commands.campaign_cases import check_factors
-from sim.sweep.design import Design
-from sim.sweep.plan import load_plan
+from sim.trials.campaign.cases import check_factors
+from sim.trials.sweep.design import Design
+from sim.trials.sweep.plan import load_plan
 
 
 @pytest.fixture(scope="module")

@@ -8,12 +8,13 @@ import sys
 import matplotlib.image
 import numpy as np
 import pytest
+from every_item import every
 from test_docs_words import VAGUE
 
+from gfimu.base.errors import InputError
+from gfimu.base.files.model_files import effect_catalogue
 from gfimu.diagnosis.design.proposal import SEPARATED
 from gfimu.diagnosis.policy import Policy
-from gfimu.errors import InputError
-from gfimu.files.model_files import effect_catalogue
 from sim.effects import (
     BODY_EFFECTS,
     CARRIAGE_EFFECTS,
@@ -62,7 +63,7 @@ def test_the_pages_are_those_of_the_code(script, folder):
     )
 
 
-@pytest.mark.parametrize("name", EFFECTS)
+@every("name", EFFECTS)
 def test_a_page_has_its_parts(folder, name):
     page = (folder / f"{name}.md").read_text(encoding="utf-8")
     formula = page.partition("## Mathematics")[2].partition("##")[0]
@@ -75,7 +76,7 @@ def test_a_page_has_its_parts(folder, name):
     assert not VAGUE.search(re.sub(r"`[^`]*`", "", page))
 
 
-@pytest.mark.parametrize("name", EFFECTS)
+@every("name", EFFECTS)
 def test_an_effect_without_computed_rivals_says_how_it_is_found(folder, name):
     own = describe(EFFECTS[name]).rivals
     assert bool(own) == (not effect_catalogue()[name]["motions"])
@@ -100,7 +101,7 @@ def test_the_pictures_are_small_and_have_ink(folder):
         assert np.quantile(brightness, 0.1) > 0.25
 
 
-@pytest.mark.parametrize("name", EFFECTS)
+@every("name", EFFECTS)
 def test_the_command_of_a_page_hides_the_effect(script, name):
     trials = script("effect_trials")
     changes = trials.changes_of(EFFECTS[name], describe(EFFECTS[name]).example)
@@ -132,6 +133,7 @@ def test_the_rivals_in_a_constant_spin_are_those_that_are_stored(script):
             assert found["rivals"][rival][0] == pytest.approx(share, abs=0.003), (name, rival)
 
 
+@pytest.mark.study
 def test_the_rivals_are_those_that_are_stored(script):
     found = script("effect_numbers").rivalry(EFFECTS)
     for name, stored in effect_catalogue().items():
@@ -187,7 +189,7 @@ class BeltSlip(Effect):
 
 def test_an_effect_of_another_package_has_a_page_too(script, tmp_path, monkeypatch):
     made = script("make_effect_catalogue")
-    for module in ("gfimu.plugins", "sim.effects.registry"):
+    for module in ("gfimu.base.plugins", "sim.effects.registry"):
         monkeypatch.setattr(sys.modules[module], "plugins", lambda group, kind, own=(): {"belt_slip": BeltSlip})
     monkeypatch.setattr(made, "added_effects", lambda: {"belt_slip": BeltSlip})
     computed = {"belt_slip": {"motions": {}, "experiments": {}}}

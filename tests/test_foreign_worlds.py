@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from every_item import every
 from foreign_world import (
     CASES,
     SIZES,
@@ -18,10 +19,12 @@ from foreign_world import (
     new_recording,
 )
 
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.array.array import AccelerometerArray
 from sim import forward
-from sim.benchmark import generators
-from sim.benchmark.generators.foreign_effects import (
+from sim.effects import EFFECTS
+from sim.motions.motion import SplineSpin
+from sim.trials.benchmark import generators
+from sim.trials.benchmark.generators.foreign_effects import (
     FOREIGN,
     PLACES,
     STAGES,
@@ -31,13 +34,11 @@ from sim.benchmark.generators.foreign_effects import (
     by_positions,
     noise_free,
 )
-from sim.benchmark.generators.foreign_world import distance, sized, table_motion
-from sim.benchmark.generators.independent_effects import CHANNELS, DRAWS, EXOTICS
-from sim.benchmark.generators.independent_world import Setting
-from sim.effects import EFFECTS
-from sim.motions.motion import SplineSpin
-from sim.study.cases import Case
-from sim.study.outcome import draw_world
+from sim.trials.benchmark.generators.foreign_world import distance, sized, table_motion
+from sim.trials.benchmark.generators.independent_effects import CHANNELS, DRAWS, EXOTICS
+from sim.trials.benchmark.generators.independent_world import Setting
+from sim.trials.study.cases import Case
+from sim.trials.study.outcome import draw_world
 from sim.twin import Twin
 
 FOLDER = Path(generators.__file__).parent
@@ -72,13 +73,13 @@ def test_no_name_is_one_of_a_library_and_kin_are():
     assert {name for effect in FOREIGN.values() for name in effect.kin} <= set(EFFECTS)
 
 
-@pytest.mark.parametrize("file", sorted(FOLDER.glob("*.py")), ids=lambda file: file.stem)
+@every("file", sorted(FOLDER.glob("*.py")))
 def test_generators_share_no_code_with_the_project(file):
     tree = ast.parse(file.read_text(encoding="utf-8"))
     modules = {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
     modules |= {name.name for node in ast.walk(tree) if isinstance(node, ast.Import) for name in node.names}
     own = {name for name in modules if name.split(".")[0] in {"sim", "gfimu", "firmware_bridge"}}
-    assert all(name.startswith("sim.benchmark.generators.") for name in own)
+    assert all(name.startswith("sim.trials.benchmark.generators.") for name in own)
 
 
 @pytest.mark.parametrize("name", FOREIGN)

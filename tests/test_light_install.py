@@ -9,8 +9,8 @@ import tomllib
 
 import pytest
 
-from gfimu.errors import GfimuError, InputError, MissingPackageError, OmittedFileWarning
-from gfimu.optional_packages import OPTIONAL, install_command, missing, packages_of, require
+from gfimu.base.errors import GfimuError, InputError, MissingPackageError, OmittedFileWarning
+from gfimu.base.optional_packages import OPTIONAL, install_command, missing, packages_of, require
 
 BLOCKED_BY_PACKAGE = ("sim/rigs/",)
 """Folders whose ``__init__`` refuses the import where the package is missing."""
@@ -19,17 +19,17 @@ DRAWING = {
     "matplotlib": {
         "gfimu/array_search/pictures.py",
         "gfimu/calibration/pictures.py",
-        "gfimu/crash/picture.py",
+        "gfimu/motion/impact/picture.py",
         "gfimu/diagnosis/report/channel_tables.py",
         "gfimu/diagnosis/report/figures.py",
-        "gfimu/position_drift/pictures.py",
+        "gfimu/budget/drift/pictures.py",
         "gfimu/sensor_noise/pictures.py",
-        "gfimu/tolerances/picture.py",
+        "gfimu/budget/tolerances/picture.py",
         "gfimu/visual/page/svg.py",
         "gfimu/visual/rig/figure.py",
-        "sim/sweep/page.py",
-        "sim/sweep/panels.py",
-        "sim/sweep/picture.py",
+        "sim/trials/sweep/page.py",
+        "sim/trials/sweep/panels.py",
+        "sim/trials/sweep/picture.py",
     },
     "rerun": {
         "gfimu/visual/comparison.py",
@@ -41,7 +41,7 @@ DRAWING = {
         "gfimu/visual/scene.py",
         "gfimu/visual/trace.py",
     },
-    "mujoco": {"sim/drawing.py", "sim/benchmark/generators/independent_table.py"},
+    "mujoco": {"sim/drawing.py", "sim/trials/benchmark/generators/independent_table.py"},
     "unicorn": {"firmware_bridge/board/cpu.py"},  # guarded there
 }
 """Modules that import an optional package at their top; whoever imports them has called `require` before."""
@@ -56,6 +56,7 @@ def test_calls_that_need_an_extra_are_refused_before_any_work(project_root):
     assert done.returncode == 0, done.stdout + done.stderr
 
 
+@pytest.mark.study
 def test_all_calls_of_the_core_work_without_the_extras(project_root):
     done = run(str(project_root / "tests" / "core_commands.py"), "--block")
     assert done.returncode == 0, done.stdout + done.stderr

@@ -79,6 +79,7 @@ def checked(site: Path, folder: Path, script: str) -> list[str]:
     return done.stdout.splitlines()
 
 
+@pytest.mark.study
 def test_a_user_sees_real_types(site: Path, tmp_path: Path) -> None:
     lines = checked(site, tmp_path, SCRIPT)
     assert lines[-1].startswith("Success"), "\n".join(lines)

@@ -7,12 +7,8 @@ import subprocess
 import tomllib
 
 import pytest
-from packaging.version import Version
 
 import gfimu
-
-CALL = re.compile(r'^former_name\(__name__, "([\w.]+)", removed="([\d.]+)"\)$', re.MULTILINE)
-FORMER = re.compile(r"^\| module `(gfimu\.[\w.]+)` \| `(gfimu\.[\w.]+)` \| ([\d.]+) \|$", re.MULTILINE)
 
 
 def text(root, name: str) -> str:
@@ -45,20 +41,7 @@ def test_citation_is_of_the_present_version(project_root):
 def test_the_version_stands_in_one_place(project_root):
     project = tomllib.loads(text(project_root, "pyproject.toml"))
     assert project["project"]["dynamic"] == ["version"]
-    assert project["tool"]["hatch"]["version"]["path"] == "gfimu/__init__.py"
-
-
-def test_deprecated_modules_are_those_that_warn(project_root):
-    page = text(project_root, "docs/development/stability.md")
-    stated = {former: (new, removed) for former, new, removed in FORMER.findall(page)}
-    found = {}
-    for file in (project_root / "gfimu").rglob("*.py"):
-        module = ".".join(file.relative_to(project_root).with_suffix("").parts)
-        if call := CALL.search(file.read_text(encoding="utf-8")):
-            found[module] = call.groups()
-    assert found == stated
-    present = Version(gfimu.__version__)
-    assert all(Version(removed) > present for _, removed in found.values()), "its time has come"
+    assert project["tool"]["hatch"]["version"]["path"] == "gfimu/base/version.py"
 
 
 @pytest.mark.parametrize(

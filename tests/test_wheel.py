@@ -53,7 +53,7 @@ def _run(site: Path, *arguments: str, cwd: Path) -> subprocess.CompletedProcess[
         "import sys, gfimu, sim; from pathlib import Path; "
         f"site = Path({str(site)!r}); "
         "assert all(Path(p.__file__).is_relative_to(site) for p in (gfimu, sim)), gfimu.__file__; "
-        "from gfimu.cli import main; main()"
+        "from gfimu.commands.shell.program import main; main()"
     )
     environment = {**os.environ, "PYTHONPATH": str(site)}
     return subprocess.run(
@@ -64,7 +64,7 @@ def _run(site: Path, *arguments: str, cwd: Path) -> subprocess.CompletedProcess[
 def test_models_lie_inside_the_wheel(installed: Path) -> None:
     assert (installed / "sim" / "models" / "arrays" / "cube12.toml").is_file()
     assert (installed / "sim" / "models" / "mjcf" / "turntable.xml").is_file()
-    assert (installed / "gfimu" / "certification" / "certificate.schema.json").is_file()
+    assert (installed / "gfimu" / "calibration" / "certificate" / "certificate.schema.json").is_file()
     page = installed / "gfimu" / "visual" / "page"
     for name in (
         "plots.js",
@@ -78,7 +78,7 @@ def test_models_lie_inside_the_wheel(installed: Path) -> None:
         assert (page / name).is_file(), name
     assert (installed / "gfimu" / "diagnosis" / "report" / "templates" / "report.css").is_file()
     assert (installed / "sim" / "models" / "effects" / "catalogue.json").is_file()
-    assert (installed / "sim" / "benchmark" / "gfimu-bench-1.jsonl.xz").is_file()
+    assert (installed / "sim" / "trials" / "benchmark" / "gfimu-bench-1.jsonl.xz").is_file()
     assert not (installed / "tests").exists()
     (licences,) = installed.glob("*.dist-info/licenses")
     assert (licences / "LICENSE").is_file()
@@ -142,7 +142,7 @@ def test_the_sdist_holds_what_git_holds_and_no_more(unpacked: Path) -> None:
 
 
 def test_tests_run_from_the_sdist(unpacked: Path) -> None:
-    tests = ["tests/gfimu/geometry/test_kinematics.py", "tests/test_docs_words.py"]
+    tests = ["tests/gfimu/array/test_kinematics.py", "tests/test_docs_words.py"]
     done = subprocess.run(
         [sys.executable, "-m", "pytest", "-n", "0", "-p", "no:cacheprovider", *tests],
         cwd=unpacked,

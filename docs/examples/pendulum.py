@@ -12,7 +12,7 @@ import sys
 import numpy as np
 
 import gfimu
-from gfimu.own_rig import Cause, Parameter, SimulatorModel, bias_cause, gain_cause
+from gfimu.model.own_rig import Cause, Parameter, SimulatorModel, bias_cause, gain_cause
 
 GRAVITY = 9.80665
 NEAR, FAR = 0.20, 0.45  # m from the pivot

@@ -84,5 +84,5 @@ print(second.verdict.replace("_", " "))
 assert second.verdict == "nothing_found"
 
 # %% [markdown]
-# For people who were not here, `found.report("diagnosis")` writes a folder with the verdict, the twin, a report that
-# needs no network, and a rerun recording of the rig. `gfimu.view(found)` opens the latter.
+# For people who were not here, `gfimu.write_report(found, "diagnosis")` writes a folder with the verdict, the twin, a
+# report that needs no network, and a rerun recording of the rig. `gfimu.view(found)` opens the latter.

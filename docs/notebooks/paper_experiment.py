@@ -93,7 +93,7 @@ assert inside.mean() > 0.8
 # the same errors without linearisation.
 
 # %%
-drift = gfimu.drift(cube, time=30.0, noise_ug=290.0, monte_carlo=200, seed=1)
+drift = gfimu.drift(cube, duration=30.0, noise_ug=290.0, monte_carlo=200, seed=1)
 drift
 
 # %%

@@ -18,15 +18,15 @@ import numpy as np
 from scipy.optimize import fsolve
 from scipy.spatial.transform import Rotation
 
+from gfimu.array.array import AccelerometerArray
+from gfimu.array.kinematics import specific_force
+from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.calibration.error_model import ErrorModel
 from gfimu.calibration.methods import calibrate
 from gfimu.calibration.registry import METHODS
 from gfimu.calibration.result import Calibration
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.geometry.kinematics import specific_force
 from gfimu.recording import Recording
 from gfimu.recording.carried_array import array_metadata
-from gfimu.units import STANDARD_GRAVITY
 from sim.chips.adxl345 import Sensor, SensorSettings
 from sim.motions.pose_sequence import PoseSequence
 

@@ -78,7 +78,7 @@ missed. *Share* is the part of an effect's energy, in units of the noise, that a
 squared correlation of the two changes of the data, after the other unknowns are fitted. *Nats* is
 the expected difference of the log likelihoods of the effect and the rival; below {SEPARATED:g} the two are not
 separable. The figures are computed as `gfimu check` and `gfimu design` do, for `cube12` with ADXL345 chips at 100 Hz.
-Effects marked ° belong to the wider library, which is searched only where the usual effects give no good answer.
+Effects marked ° belong to the wider library, which is searched where the evidence asks for it.
 
 Motions: *constant spin*, 30 s at 4 rad/s; *speed sweep*, the scenario `speed_sweep`; *tilted rest*, 60 s at rest,
 tilted by 30°; *calibration poses*, 18 rests of 6 s with faces and edges up; *tumble* and *in the hand*, the scenarios

@@ -8,10 +8,10 @@ from typing import Any
 from effect_formulas import BY_CHANCE, TOLERANCE, to_latex, vectors_of
 from effect_trials import simulate_command, twin_of
 
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.units import NAME, NUMBER, RATIO
 from gfimu.diagnosis.design.proposal import SEPARATED
 from gfimu.diagnosis.policy import Policy
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.units import NAME, NUMBER, RATIO
 from sim.effects import BODY_EFFECTS, CARRIAGE_EFFECTS, FURTHER_EFFECTS, TABLE_EFFECTS
 from sim.effects.base import Effect
 from sim.effects.catalogue import PLACES, every_effect, place_of
@@ -81,7 +81,7 @@ def _where(effect: type[Effect]) -> str:
     ]
     looked = f"A diagnosis looks for it on {_and(kinds)}" if kinds else "A diagnosis does not look for it"
     if effect.name in FURTHER_EFFECTS and effect.name not in BODY_EFFECTS:
-        looked += ", in the wider library that is searched where the usual effects give no good answer"
+        looked += ", in the wider library that is searched where the evidence asks for it"
     if effect.name == "angle_zero":
         looked = "A diagnosis looks for it on an inclined table with an encoder"
     if effect.name == "unknown":

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from gfimu.base.errors import InputError
 from gfimu.diagnosis.data.body.run import prepare_body_run
 from gfimu.diagnosis.data.body.stretch import BodyStretch
 from gfimu.diagnosis.data.run import prepare_run
@@ -29,7 +30,6 @@ from gfimu.diagnosis.fit.evidence import SCALES
 from gfimu.diagnosis.fit.learn import starting_point
 from gfimu.diagnosis.fit.linear import Point, linearise
 from gfimu.diagnosis.policy import Policy
-from gfimu.errors import InputError
 from sim.effects import make_effect
 from sim.motions.motion import SplineSpin
 from sim.motions.pose_sequence import PoseSequence

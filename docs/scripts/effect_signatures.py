@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.array.array import AccelerometerArray
 from sim.effects import make_effect
 from sim.effects.grammar import TURNS
 from sim.motions.motion import SpinState

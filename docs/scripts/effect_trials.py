@@ -13,8 +13,8 @@ from typing import Any
 
 from effect_signatures import WARMING, WARMING_TIME, reference_run_of
 
+from gfimu.base.errors import GfimuError
 from gfimu.diagnosis.diagnose import diagnose
-from gfimu.errors import GfimuError
 from sim.effects.base import Effect
 from sim.scenarios import Scenario
 from sim.simulation import simulate

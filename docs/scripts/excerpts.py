@@ -3,7 +3,7 @@
 A fenced block ``console`` holds commands behind ``$ `` and what each prints. The blocks of a page run from top to
 bottom in one folder that holds the files of docs/examples. A comment on the line before a block or a picture says::
 
-    <!-- run: study -->           it takes long: left out unless asked for, in tests by -m study
+    <!-- run: study -->           it takes long: left out unless asked for, which the study `docs` does
     <!-- run: exit 2 -->          the command ends with this exit code instead of 0
     <!-- run: needs unicorn -->   left out where this Python module is not installed
     <!-- file: my_array.toml -->  the block below is a file in that folder

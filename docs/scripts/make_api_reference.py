@@ -14,18 +14,24 @@ from collections.abc import Iterable
 from importlib import import_module
 from pathlib import Path
 
-import gfimu
+from gfimu.base.lazy_names import homes_of
 
 FOLDER = Path(__file__).resolve().parents[1] / "reference" / "api"
 
 GROUPS = {
     "commands": ("Commands as functions", ("gfimu.commands",)),
-    "recordings": ("Recordings and errors", ("gfimu.recording", "gfimu.errors", "gfimu.importing", "gfimu.joining")),
-    "geometry": ("Arrays and kinematics", ("gfimu.geometry", "gfimu.array_search")),
-    "motion": ("Motion, attitude and navigation", ("gfimu.motion", "gfimu.known_axis", "gfimu.crash")),
-    "rate": ("Angular rate and its bounds", ("gfimu.rate", "gfimu.bounds")),
-    "calibration": ("Calibration and noise", ("gfimu.calibration", "gfimu.certification", "gfimu.sensor_noise")),
-    "drift": ("Position drift", ("gfimu.position_drift",)),
+    "recordings": (
+        "Recordings and errors",
+        ("gfimu.recording", "gfimu.base.errors", "gfimu.recording.importing", "gfimu.recording.joining"),
+    ),
+    "geometry": ("Arrays and kinematics", ("gfimu.array", "gfimu.array_search")),
+    "motion": ("Motion, attitude and navigation", ("gfimu.motion", "gfimu.rate.axis", "gfimu.motion.impact")),
+    "rate": ("Angular rate and its bounds", ("gfimu.rate", "gfimu.rate.bounds")),
+    "calibration": (
+        "Calibration and noise",
+        ("gfimu.calibration", "gfimu.calibration.certificate", "gfimu.sensor_noise"),
+    ),
+    "drift": ("Position drift", ("gfimu.budget.drift",)),
     "diagnosis": ("Diagnosis", ("gfimu.diagnosis",)),
     "twins": ("Scenarios and twins", ("sim",)),
     "further": ("Further names", ()),
@@ -44,7 +50,7 @@ OTHERS = {
             "sim.chips.adxl345": ("Sensor", "SensorErrors", "SensorSettings"),
             "sim.chips.data_sheet": ("DataSheet",),
             "sim.effects": ("Effect",),
-            "sim.worlds.factory": ("WorldFactory", "MeasuredWorld"),
+            "sim.trials.worlds.factory": ("WorldFactory", "MeasuredWorld"),
         },
     ),
     "firmware_bridge": (
@@ -55,7 +61,8 @@ OTHERS = {
             "firmware_bridge.frames.format_file": ("load_format",),
             "firmware_bridge.frames.decoder": ("SampleDecoder", "Samples", "StreamCounts"),
             "firmware_bridge.host.finder": ("find_boards", "Found"),
-            "firmware_bridge.host.recorder": ("record", "RecordReport"),
+            "firmware_bridge.host.record_report": ("RecordReport",),
+            "firmware_bridge.host.recorder": ("record",),
             "firmware_bridge.host.clock": ("ClockFit", "HostClock"),
             "firmware_bridge.sources.source": ("Source",),
             "firmware_bridge.sources.klipper": ("KlipperSource",),
@@ -82,8 +89,9 @@ def page_of(module: str) -> str:
 def pages() -> dict[str, str]:
     """Return the text of every page by its name."""
     names: dict[str, list[str]] = {page: [] for page in GROUPS}
-    for name, module in sorted(gfimu._PUBLIC.items(), key=lambda item: item[0].lower()):
-        names[page_of(module)].append(name)
+    for name, module in sorted(homes_of("gfimu").items(), key=lambda item: item[0].lower()):
+        if name != "__version__":
+            names[page_of(module)].append(name)
     texts = {
         page: _page(title, "Names of `gfimu`: `from gfimu import …`.", {"gfimu": names[page]})
         for page, (title, _) in GROUPS.items()

@@ -8,10 +8,10 @@ from pathlib import Path
 
 from make_cli_reference import escape
 
-from sim.benchmark.judge import Judged
-from sim.benchmark.judged_file import read_judged
-from sim.benchmark.release import SETS, cases, release_hash
-from sim.benchmark.table import markdown, summaries
+from sim.trials.benchmark.judged import Judged
+from sim.trials.benchmark.judged_file import read_judged
+from sim.trials.benchmark.release import SETS, cases, release_hash
+from sim.trials.benchmark.table import markdown, summaries
 
 FOLDER = Path(__file__).resolve().parents[1] / "accuracy"
 PAGE, JUDGED = FOLDER / "benchmark.md", FOLDER / "benchmark.jsonl.xz"

@@ -18,8 +18,8 @@ from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 import typer
 
-from gfimu.cli.app import program
-from gfimu.cli.command_list import JOBS
+from gfimu.commands.shell.command_list import JOBS, help_line
+from gfimu.commands.shell.program import program
 
 _KINDS = {Path: "PATH", str: "TEXT", int: "N", float: "NUMBER", bool: ""}
 FOLDER = Path(__file__).resolve().parents[1] / "reference" / "cli"
@@ -200,9 +200,9 @@ def pages() -> dict[str, str]:
     commands = typer.main.get_command(program()).commands  # type: ignore[attr-defined]
     texts = {name: command_page(name, command) for name, command in commands.items()}
     contents = []
-    for job, entries in JOBS.items():
+    for job, names in JOBS.items():
         contents += [f"## {job}\n", "| command | |", "|---|---|"]
-        contents += [f"| [`gfimu {entry.name}`]({entry.name}.md) | {escape(entry.help)} |" for entry in entries]
+        contents += [f"| [`gfimu {name}`]({name}.md) | {escape(help_line(name))} |" for name in names]
         contents.append("")
     tree = "\n".join(["```{toctree}", ":hidden:", *texts, "```", ""])
     return texts | {"index": "\n".join([INDEX, *contents, tree])}

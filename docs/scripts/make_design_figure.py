@@ -21,8 +21,8 @@ from gfimu.diagnosis.design.distinguishability import gained_log_likelihood
 from gfimu.diagnosis.design.profile_search import plain_profile
 from gfimu.diagnosis.design.proposal import SEPARATED
 from sim.effects import make_effect
+from sim.trials.worlds.hidden import Measurement, measure
 from sim.twin import Twin
-from sim.worlds.hidden import Measurement, measure
 
 LIMITS = Limits(rate=15.0, acceleration=20.0, duration=60.0)
 STRETCH = 5e-5  # s²/rad²: the arms are 1.1 % longer at 15 rad/s

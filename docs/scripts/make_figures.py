@@ -18,13 +18,13 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from gfimu import AccelerometerArray, Recording
+from gfimu.base.units import STANDARD_GRAVITY
+from gfimu.budget.drift import TILT_LIMIT, ErrorSources, drift_budget, equivalent_rate_drift
+from gfimu.budget.drift.monte_carlo import monte_carlo_drift
 from gfimu.motion.attitude import to_rotation
 from gfimu.motion.estimate import Estimate
 from gfimu.motion.navigation import navigate
 from gfimu.motion.rest_bias import estimate_from_rest
-from gfimu.position_drift import TILT_LIMIT, ErrorSources, drift_budget, equivalent_rate_drift
-from gfimu.position_drift.monte_carlo import monte_carlo_drift
-from gfimu.units import STANDARD_GRAVITY
 from sim.effects import make_effect
 from sim.scenarios import Scenario
 from sim.simulation import simulate

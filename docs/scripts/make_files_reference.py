@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from gfimu.certification.schema import SCHEMA_FILE, certificate_schema
+from gfimu.base.files.schema_keys import TableRows, json_schema, table_rows
+from gfimu.calibration.certificate.schema import SCHEMA_FILE, certificate_schema
 from gfimu.commands.file_kinds import FILE_KINDS, file_schema
-from gfimu.files.schema_keys import TableRows, json_schema, table_rows
 
 PAGE = Path(__file__).resolve().parents[1] / "reference" / "files.md"
 SCHEMAS = PAGE.parent / "schemas"

@@ -22,8 +22,8 @@ from typing import Any
 import numpy as np
 
 import gfimu
-from sim.study.outcome_file import read_outcomes
-from sim.study.tally import Tally, visible
+from sim.trials.study.outcome_file import read_outcomes
+from sim.trials.study.tally import Tally, visible
 
 FOLDER = Path(__file__).resolve().parents[1] / "accuracy"
 PAGE, SPEEDS, OUTCOMES = FOLDER / "measured.md", FOLDER / "speed.json", FOLDER / "diagnosis-study.jsonl.xz"

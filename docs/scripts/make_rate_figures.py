@@ -12,12 +12,12 @@ import matplotlib.pyplot as plt
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.bounds.sample import alpha_std, rate_bound_isotropic, steady_rate_bound
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.array.array import AccelerometerArray
+from gfimu.array.parts.part import white_noise_std
+from gfimu.budget.drift import ErrorSources, drift_budget, equivalent_rate_drift
 from gfimu.motion.estimate import Estimate
 from gfimu.motion.rest_bias import estimate_from_rest, rest_bias
-from gfimu.parts.part import white_noise_std
-from gfimu.position_drift import ErrorSources, drift_budget, equivalent_rate_drift
+from gfimu.rate.bounds.sample import alpha_std, rate_bound_isotropic, steady_rate_bound
 from gfimu.rate.kalman import FilterSettings
 from gfimu.rate.methods import RATE_METHODS, estimate_rate
 from gfimu.rate.sensing import SensorErrors

@@ -18,11 +18,11 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
+from gfimu.base.results.colours import AFTER_ON_PAPER, BEFORE_ON_PAPER, NOISE_ON_PAPER, css
 from gfimu.diagnosis.criticism.views.residuals import residual_views
 from gfimu.diagnosis.diagnose import diagnose
 from gfimu.diagnosis.verdict.verdict import Diagnosis
 from gfimu.recording.mimu4444 import read_mimu4444
-from gfimu.visual.colours import AFTER_ON_PAPER, BEFORE_ON_PAPER, NOISE_ON_PAPER, css
 from sim.scenarios import Scenario
 from sim.simulation import simulate
 from sim.twin import Twin
@@ -146,7 +146,7 @@ def board_noise(diagnosis: Diagnosis, path: Path) -> None:
     panel.loglog(change[use], left_over[use], ".", ms=1.2, color=AFTER, alpha=0.4, rasterized=True)
     line = np.geomspace(5, change[use].max(), 50)
     floor = diagnosis.residual.noise_floor
-    panel.loglog(line, np.hypot(floor, diagnosis.noise["disagreement_s"] * line), color="black", lw=1.2)
+    panel.loglog(line, np.hypot(floor, diagnosis.noise.disagreement_s * line), color="black", lw=1.2)
     panel.axhline(floor, color=INK, lw=0.8)
     panel.set(xlabel="rate of change of the readings, m/s³", ylabel="rms of 24 channels left, m/s²")
     figure.savefig(path)

@@ -1,1 +1,5 @@
-"""The ADXL345 at register level: what a driver sees through SPI or I2C (data sheet Rev. E)."""
+"""The ADXL345 at register level (data sheet Rev. E).
+
+In: specific force, accesses over SPI or I2C.
+Out: register contents, interrupts, FIFO as a driver sees them.
+"""

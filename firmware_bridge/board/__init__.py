@@ -1,1 +1,5 @@
-"""The emulated LPC1768 board; needs the extra `firmware` and runs in a process of its own (`board_process`)."""
+"""The emulated LPC1768 board; needs the extra ``firmware``.
+
+In: an image, the readings of its chips.
+Out: bytes on its line, pins, faults, a trace.
+"""

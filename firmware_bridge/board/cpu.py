@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from firmware_bridge.board.bus import Bus, Tracer
 from firmware_bridge.board.faults import BoardFault, FaultKind
 from firmware_bridge.board.nvic import SVCALL, UNMASKABLE, Nvic
-from gfimu.optional_packages import require
+from gfimu.base.optional_packages import require
 
 if TYPE_CHECKING:
     from firmware_bridge.lpc1768.elf import ElfImage

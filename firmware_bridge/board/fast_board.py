@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 import hashlib
 import os
-import subprocess
+import stat
 import sys
 import tempfile
 from array import array
@@ -31,7 +31,8 @@ from firmware_bridge.board.timer import Timer
 from firmware_bridge.board.uart import Uart
 from firmware_bridge.lpc1768.build import compiler_version
 from firmware_bridge.lpc1768.elf import ElfImage
-from gfimu.errors import GfimuError
+from gfimu.base.child_process import run_module
+from gfimu.base.errors import GfimuError
 
 __all__ = ["FastBoard", "build_native"]
 
@@ -87,8 +88,19 @@ def _cache_folder() -> Path:
     try:
         (folder / "gfimu").mkdir(parents=True, exist_ok=True)
     except OSError:
-        return Path(tempfile.gettempdir())
+        return _private_folder()
     return folder / "gfimu"
+
+
+def _private_folder() -> Path:
+    """Return a folder for temporary files that no other user can put a library into."""
+    owner = os.getuid() if hasattr(os, "getuid") else 0
+    folder = Path(tempfile.gettempdir()) / f"gfimu-{owner}"
+    folder.mkdir(mode=0o700, exist_ok=True)
+    found = folder.lstat()
+    if found.st_uid != owner or not stat.S_ISDIR(found.st_mode) or stat.S_IMODE(found.st_mode) & 0o022:
+        raise GfimuError(f"{folder}: is another user's; set XDG_CACHE_HOME to a folder that is yours")
+    return folder
 
 
 @cache
@@ -109,8 +121,7 @@ def build_native() -> Path:
         return library
     with tempfile.TemporaryDirectory(dir=library.parent) as scratch:
         fresh = Path(scratch) / library.name
-        command = [sys.executable, "-m", "ziglang", "cc", *_FLAGS, str(_SOURCE), "-o", str(fresh), "-lm"]
-        run = subprocess.run(command, capture_output=True, text=True, check=False)
+        run = run_module("ziglang", "cc", *_FLAGS, str(_SOURCE), "-o", str(fresh), "-lm", text=True)
         if run.returncode:
             raise GfimuError(f"the fast path of the board does not compile:\n{run.stderr.strip()}")
         fresh.replace(library)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import enum
 from collections.abc import Mapping
 
-from gfimu.errors import GfimuError
+from gfimu.base.errors import GfimuError
 
 __all__ = ["BoardFault", "FaultKind"]
 

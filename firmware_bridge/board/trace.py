@@ -5,12 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated, Any
+
+from numpy.typing import NDArray
 
 from firmware_bridge.adxl345.registers import TICKS_PER_SECOND
-from gfimu.files.atomic_file import atomic_path
-from gfimu.files.rerun_stream import rrd_stream
+from gfimu.base.declared import Declared, Table, figure, figures
+from gfimu.base.files.atomic_file import atomic_path
+from gfimu.base.files.rerun_stream import rrd_stream
+from gfimu.base.results import TableResult, one_row
 
-__all__ = ["Event", "EventList", "write_rrd", "write_vcd"]
+__all__ = ["Event", "EventList", "TraceCounts", "write_rrd", "write_vcd"]
 
 _PICOSECONDS = 1_000_000_000_000
 _NAMES = {2: "NMI", 3: "HardFault", 11: "SVCall", 14: "PendSV", 15: "SysTick"}
@@ -19,6 +24,26 @@ _IRQS = (
     "SPI", "SSP0", "SSP1", "PLL0", "RTC", "EINT0", "EINT1", "EINT2", "EINT3", "ADC", "BOD", "USB", "CAN", "GPDMA",
     "I2S", "ETHERNET", "RIT", "MCPWM", "QEI", "PLL1", "USBACT", "CANACT",
 )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class TraceCounts(Declared, TableResult):
+    """A trace of the firmware."""
+
+    events: Annotated[int, figure("Register accesses and interrupts.", head="events")]
+    accesses: Annotated[int, figure("Register accesses of the peripherals.", head="register accesses", in_json=False)]
+    exceptions: Annotated[int, figure("Exceptions entered.", head="exceptions")]
+
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """Return one row of the counts."""
+        return one_row(vars(self))
+
+    def shown(self) -> Iterator[Table]:
+        """Yield the table that people read."""
+        yield figures(self._heading(), self)
+
+    def _heading(self) -> str:
+        return "Trace of the firmware"
 
 
 @dataclass(frozen=True)

@@ -1,1 +1,5 @@
-"""What the bytes on the wire mean: frames, commands, checksums, and formats described in files."""
+"""What the bytes on the wire mean.
+
+In: bytes, a format described in a file.
+Out: samples, commands, checksums, counts of what was lost.
+"""

@@ -6,12 +6,13 @@ import enum
 import struct
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from firmware_bridge.frames.checksum import crc16
-from gfimu.errors import InputError
+from gfimu.base.declared import Declared, figure
+from gfimu.base.errors import InputError
 
 __all__ = [
     "FAST_BAUD",
@@ -108,52 +109,37 @@ class ArrayName:
 
 
 @dataclass(frozen=True)
-class Identity:
-    """What a board says about itself.
+class Identity(Declared):
+    """What a board states about itself."""
 
-    Parameters
-    ----------
-    firmware : str
-        Version.
-    build_id : int
-        First 32 bits of the hash of the sources.
-    rate_hz : int
-        Sample rate, Hz.
-    rate_code, data_format : int
-        BW_RATE code and DATA_FORMAT of the chips.
-    baud : int
-        Bits per second.
-    present : tuple of bool
-        Which sensors answer and hold their configuration.
-    reset_cause : str
-        Why the board started last; also ``no crystal``: it runs on its internal oscillator, whose 1 % is the clock's.
-    streaming : bool
-        Whether it sends samples.
-    spi_khz : int
-        SPI clock, kHz.
-    dropped : int
-        Frames that the line could not take.
-    faulty : tuple of bool
-        Which sensors identify themselves but have a register that does not read back as written.
-    """
-
-    firmware: str
-    build_id: int
-    rate_hz: int
-    rate_code: int
-    data_format: int
-    baud: int
-    present: tuple[bool, ...]
-    reset_cause: str
-    streaming: bool
-    spi_khz: int
-    dropped: int
-    faulty: tuple[bool, ...] = ()
+    firmware: Annotated[str, figure("Version of the firmware.")]
+    build_id: Annotated[int, figure("First 32 bits of the hash of its sources.")]
+    rate_hz: Annotated[int, figure("Sample rate.", "Hz")]
+    rate_code: Annotated[int, figure("BW_RATE code of the chips.")]
+    data_format: Annotated[int, figure("DATA_FORMAT of the chips.")]
+    baud: Annotated[int, figure("Speed of the line.", "bit/s")]
+    present: Annotated[tuple[bool, ...], figure("Which chips answer and hold their configuration.")]
+    reset_cause: Annotated[
+        str,
+        figure("Why the board started last; no crystal: it runs on its internal oscillator, whose 1 % is the clock's."),
+    ]
+    streaming: Annotated[bool, figure("Whether it sends samples.")]
+    spi_khz: Annotated[int, figure("Clock of the bus to the chips.", "kHz")]
+    dropped: Annotated[int, figure("Frames that the line could not take.")]
+    faulty: Annotated[
+        tuple[bool, ...],
+        figure("Which chips identify themselves but have a register that does not read back as written."),
+    ] = ()
 
     @property
     def range_g(self) -> int:
         """Range of the chips, in units of g."""
         return 2 << (self.data_format & 3)
+
+    @property
+    def settings(self) -> str:
+        """Firmware, sample rate and range in words."""
+        return f"{self.firmware}, {self.rate_hz} Hz, ±{self.range_g} g"
 
     @property
     def full_resolution(self) -> bool:

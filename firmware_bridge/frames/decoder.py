@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,9 +27,10 @@ from firmware_bridge.frames.frame_format import (
     encode_message,
     encode_samples,
 )
-from gfimu.errors import unknown_name
-from gfimu.files.model_files import list_models
-from gfimu.short_repr import short_repr
+from gfimu.base.declared import Declared, figure
+from gfimu.base.errors import unknown_name
+from gfimu.base.files.model_files import list_models
+from gfimu.base.short_repr import short_repr
 
 __all__ = [
     "FORMATS",
@@ -110,16 +111,19 @@ class Samples:
 
 
 @dataclass(frozen=True)
-class StreamCounts:
-    """What a stream held so far; ``unconfirmed`` samples had the right checksum and followed no other sample."""
+class StreamCounts(Declared):
+    """How a stream of samples came in."""
 
-    samples: int
-    messages: int
-    lost: int
-    corrupt: int
-    skipped_bytes: int
-    restarts: int
-    unconfirmed: int = 0
+    samples: Annotated[int, figure("Samples that were received.", head="samples")]
+    messages: Annotated[int, figure("Messages of the board that are no samples.")]
+    lost: Annotated[int, figure("Samples that were lost, by the numbers of the frames.", head="lost")]
+    corrupt: Annotated[int, figure("Frames with a wrong checksum.", head="corrupt")]
+    skipped_bytes: Annotated[int, figure("Bytes between frames.", "bytes", head="skipped")]
+    restarts: Annotated[int, figure("Restarts of the board.", head="board restarts")]
+    unconfirmed: Annotated[
+        int,
+        figure("Samples that follow no other and are refused.", head="samples that follow no other, refused"),
+    ] = 0
 
 
 class SampleDecoder:

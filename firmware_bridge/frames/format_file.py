@@ -14,11 +14,11 @@ from firmware_bridge.frames.delimited import DelimitedLayout
 from firmware_bridge.frames.frame_format import FrameFormat, TemperatureField
 from firmware_bridge.frames.packets import PacketLayout, StreamLayout
 from firmware_bridge.frames.text_lines import TextLayout
-from gfimu.errors import InputError, unknown_name
-from gfimu.files.model_files import find_model, read_toml
-from gfimu.files.schema import Positive, Table, about, read
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.parts.part_file import PartFile
+from gfimu.array.array import AccelerometerArray
+from gfimu.array.parts.part_file import PartFile
+from gfimu.base.errors import InputError, unknown_name
+from gfimu.base.files.model_files import find_model, read_toml
+from gfimu.base.files.schema import Positive, Table, about, read
 
 __all__ = ["FormatFile", "load_format"]
 

@@ -20,8 +20,8 @@ from firmware_bridge.frames.commands import (
     FrameType,
 )
 from firmware_bridge.frames.packets import PacketLayout, StreamLayout
-from gfimu.errors import InputError
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import InputError
 
 __all__ = [
     "FORMATS",

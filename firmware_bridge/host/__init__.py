@@ -1,1 +1,5 @@
-"""The computer at the other end: finding a board, recording its stream, its clock, its chips' self-test."""
+"""The computer at the other end.
+
+In: a port or another source.
+Out: a recording on the host's clock, an estimate while it streams, the chips' self-test.
+"""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +13,9 @@ from firmware_bridge.frames.commands import Command, encode_command
 from firmware_bridge.frames.decoder import SampleDecoder, Samples, Status, frame_format
 from firmware_bridge.host.line_up import line_up
 from firmware_bridge.host.link import DEFAULT_BAUD, Link
-from gfimu.errors import InputError
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.declared import Declared, figure
+from gfimu.base.errors import InputError
 
 __all__ = ["LIMITS_G", "AxisSelfTest", "check_chips", "judge"]
 
@@ -29,29 +31,21 @@ _SILENT_S = 3.0
 
 
 @dataclass(frozen=True)
-class AxisSelfTest:
-    """Self-test of one axis.
+class AxisSelfTest(Declared):
+    """Self-test of one sensing axis."""
 
-    Parameters
-    ----------
-    channel : str
-        Name, such as ``a11``.
-    shift_g : float
-        Reading under self-test less reading without, g; NaN if the chip did not answer.
-    least_g, greatest_g : float
-        Limits at the supply of the board, g.
-    noise_g : float
-        Standard deviation of the readings without self-test, g.
-    verdict : str
-        ``passed``, ``failed``, ``missing`` (no readings) or ``moved`` (the unit did not rest).
-    """
-
-    channel: str
-    shift_g: float
-    least_g: float
-    greatest_g: float
-    noise_g: float
-    verdict: str
+    channel: Annotated[str, figure("The channel.", head="channel")]
+    shift_g: Annotated[
+        float, figure("Reading under self-test less reading without; null: no answer.", "g", head="shift", form="+.3f")
+    ]
+    least_g: Annotated[float, figure("Lower limit at the supply of the board.", "g", head="least", form="+.2f")]
+    greatest_g: Annotated[float, figure("Upper limit at the supply of the board.", "g", head="most", form="+.2f")]
+    noise_g: Annotated[
+        float, figure("Standard deviation of the readings without self-test.", "g", head="noise", form=".4f")
+    ]
+    verdict: Annotated[
+        str, figure("passed, failed, missing (no readings) or moved (the unit did not rest).", head="result")
+    ]
 
 
 def check_chips(
@@ -89,7 +83,8 @@ def check_chips(
             raise InputError(f"{port}: no {layout.name} board answers; look for it with --find")
         decoder = SampleDecoder(layout)
         scale = found[0].identity.count_size
-        link.write(dialogue.start)
+        if not found[0].identity.streaming:
+            link.write(dialogue.start)
         runs = []
         try:
             for state in (False, True):

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from firmware_bridge.frames.decoder import Samples, Status
 from firmware_bridge.host.clock_track import track_clock
+from gfimu.base.declared import Declared, Matrix, figure
 
 __all__ = ["ClockFit", "HostClock", "SampleRate"]
 
@@ -20,40 +22,31 @@ _MOST_FILLED = 16  # points put into a gap, so that the uncertainty grows there
 
 
 @dataclass(frozen=True)
-class ClockFit:
-    """Host time = board time + offset, whose rate walks as that of a crystal does.
+class ClockFit(Declared):
+    """Host time = board time + offset, whose rate walks as that of a crystal does."""
 
-    Parameters
-    ----------
-    offset_s, offset_std_s : float
-        Host time at the board time ``mean_board_s``, less that board time, s. The standard deviation includes what is
-        not known of the shortest latency.
-    rate_error, rate_error_std : float
-        How much faster the host's clock runs than the board's, relative; mean over the recording.
-    mean_board_s : float
-        Board time in the middle of the fit, s.
-    residual_s : float
-        Robust spread of the arrivals, s.
-    windows : int
-        Points of the fit.
-    latency_std_s : float
-        Part of every standard deviation that all times share: what is not known of the shortest latency, s.
-    rate_walk : float
-        Strength of the random walk of the rate, 1/√s: 1e-6 means about 1 ppm in a second, 10 ppm in 100 s.
-    knots : tuple of (float, float, float)
-        Board time, offset, and its standard deviation, s: the fit is linear in between.
-    """
-
-    offset_s: float
-    offset_std_s: float
-    rate_error: float
-    rate_error_std: float
-    mean_board_s: float
-    residual_s: float
-    windows: int
-    latency_std_s: float = 0.0
-    rate_walk: float = 0.0
-    knots: tuple[tuple[float, float, float], ...] = ()
+    offset_s: Annotated[float, figure("Host time at the board time mean_board_s, less that board time.", "s")]
+    offset_std_s: Annotated[
+        float, figure("Its standard deviation, with what is not known of the shortest latency.", "s")
+    ]
+    rate_error: Annotated[
+        float, figure("How much faster the host's clock runs than the board's, relative; mean over the recording.")
+    ]
+    rate_error_std: Annotated[float, figure("Its standard deviation.")]
+    mean_board_s: Annotated[float, figure("Board time in the middle of the fit.", "s")]
+    residual_s: Annotated[float, figure("Robust spread of the arrivals.", "s")]
+    windows: Annotated[int, figure("Points of the fit.")]
+    latency_std_s: Annotated[
+        float,
+        figure("Part of every standard deviation that all times share: of the shortest latency.", "s"),
+    ] = 0.0
+    rate_walk: Annotated[
+        float, figure("Strength of the random walk of the rate: 1e-6 is about 1 ppm in a second.", "1/√s")
+    ] = 0.0
+    knots: Annotated[
+        tuple[tuple[float, float, float], ...],
+        figure("Board time, offset and its standard deviation: the fit is linear in between.", "s", json=Matrix),
+    ] = ()
 
     def to_host(self, board_s: NDArray[np.float64] | float) -> NDArray[np.float64] | float:
         """Host time of a board time, s; beyond the recording with its mean rate."""

@@ -5,11 +5,13 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 from firmware_bridge.frames.commands import ArrayName, Identity
 from firmware_bridge.frames.decoder import FORMATS, FrameFormat, SampleDecoder, frame_format
 from firmware_bridge.host.link import Chunk, Link
-from gfimu.errors import InputError
+from gfimu.base.declared import Declared, figure
+from gfimu.base.errors import InputError
 
 __all__ = ["SPEEDS", "Found", "Listener", "find_boards", "has_speed", "search_speed"]
 
@@ -21,28 +23,28 @@ _SAMPLES = 3  # in a row, for a board that is only listened to
 
 
 @dataclass(frozen=True)
-class Found:
-    """A board that answers or sends.
+class Found(Declared):
+    """A board that answers or sends."""
 
-    Parameters
-    ----------
-    port : str
-        Where it is.
-    baud : int
-        Speed at which it was understood, bits per second.
-    form : str
-        Frame format.
-    identity : Identity or None
-        What it says about itself; None if it only sends.
-    array : str
-        The array that it states; empty if it states none.
-    """
+    port: Annotated[str, figure("Where it is.")]
+    baud: Annotated[int, figure("Speed at which it was understood.", "bit/s")]
+    form: Annotated[str, figure("Frame format.")]
+    identity: Annotated[Identity | None, figure("What it states about itself; null if it only sends.")]
+    array: Annotated[str, figure("The array that it states; empty if it states none.")] = ""
 
-    port: str
-    baud: int
-    form: str
-    identity: Identity | None
-    array: str = ""
+    def sentence(self) -> str:
+        """Return port, speed, format, and what the board says about itself."""
+        line = f"{self.port}: {self.form} at {self.baud} baud" + (f", array {self.array}" if self.array else "")
+        if (identity := self.identity) is None:
+            return f"{line}, sends without answering"
+        chips = [
+            "answers" if present else "faulty" if faulty else "missing"
+            for present, faulty in zip(identity.present, identity.faulty, strict=True)
+        ]
+        return (
+            f"{line}, firmware {identity.settings}, {'sends' if identity.streaming else 'stopped'}; "
+            f"chips 1 to {len(chips)}: {', '.join(chips)}; last reset: {identity.reset_cause}"
+        )
 
 
 class Listener:

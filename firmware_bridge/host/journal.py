@@ -20,8 +20,8 @@ import pyarrow.csv as pa_csv
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from gfimu.errors import GfimuError, InputError
-from gfimu.files.atomic_file import atomic_path
+from gfimu.base.errors import GfimuError, InputError
+from gfimu.base.files.atomic_file import atomic_path
 
 __all__ = ["Journal", "JournalError"]
 

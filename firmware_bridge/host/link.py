@@ -16,7 +16,7 @@ import serial
 from firmware_bridge.frames.frame_format import FrameFormat
 from firmware_bridge.sources.ports import source_of
 from firmware_bridge.sources.source import Source
-from gfimu.errors import GfimuError, InputError
+from gfimu.base.errors import GfimuError, InputError
 
 __all__ = ["DEFAULT_BAUD", "Chunk", "Link"]
 

@@ -17,14 +17,14 @@ from numpy.typing import NDArray
 from firmware_bridge.frames.decoder import StreamCounts
 from firmware_bridge.host.recorder import Batch
 from firmware_bridge.host.stream_meter import GroupMeans, StreamMeter
-from gfimu.errors import GfimuError
-from gfimu.files.rerun_stream import rrd_stream, viewer_listens, viewer_stream
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import GfimuError
+from gfimu.base.files.rerun_stream import rrd_stream, viewer_listens, viewer_stream
 
 if TYPE_CHECKING:  # imported by the view's own thread: that takes longer than a recording should wait
-    from gfimu.integrity.fault import ChannelFault
-    from gfimu.integrity.live.background import BackgroundFilter
-    from gfimu.integrity.live.block import Event, LiveBlock
+    from gfimu.rate.health.fault import ChannelFault
+    from gfimu.rate.health.live.background import BackgroundFilter
+    from gfimu.rate.health.live.block import Event, LiveBlock
 
 __all__ = ["LiveView", "StreamDrawing", "StreamPicture"]
 
@@ -182,8 +182,8 @@ class LiveView:
 
     def _begin(self, times: NDArray[np.float64]) -> list[Event]:
         """Start the filter for the rate of the first samples; return what is to be said of it."""
-        from gfimu.integrity.live.background import BackgroundFilter
-        from gfimu.integrity.live.block import Event
+        from gfimu.rate.health.live.background import BackgroundFilter
+        from gfimu.rate.health.live.block import Event
         from gfimu.rate.sensing import SensorErrors
 
         rate = 1.0 / float(np.median(np.diff(times)))
@@ -204,7 +204,7 @@ class LiveView:
 
     def _draw(self, t: NDArray[np.float64], readings: NDArray[np.float64], events: list[Event]) -> None:
         """Take what the filter has done, pass faults on, and hand all that is new to the pictures."""
-        from gfimu.integrity.live.block import Event, LiveBlock
+        from gfimu.rate.health.live.block import Event, LiveBlock
 
         done = [] if self._filter is None else self._filter.take()
         for part in done:

@@ -17,9 +17,9 @@ from firmware_bridge.host.clock import HostClock, SampleRate
 from firmware_bridge.host.journal import Journal
 from firmware_bridge.host.link import Chunk, Link
 from firmware_bridge.host.mounting.on_board import ArrayOnBoard
-from gfimu.errors import InputError
-from gfimu.files.model_files import list_models
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import InputError
+from gfimu.base.files.model_files import list_models
 from gfimu.recording.carried_array import array_metadata
 
 __all__ = ["Batch", "RecordSession", "SampleClock"]

@@ -8,17 +8,12 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from numpy.typing import NDArray
-
-import gfimu
 from firmware_bridge.frames.commands import Identity, asked_rate
 from firmware_bridge.frames.decoder import FrameFormat, StreamCounts
-from firmware_bridge.host.clock import ClockFit
 from firmware_bridge.host.finder import SPEEDS, has_speed
 from firmware_bridge.host.journal import JournalError
 from firmware_bridge.host.line_up import line_up, needed_baud
@@ -31,81 +26,20 @@ from firmware_bridge.host.mounting.on_board import (
     load_stated,
     take_waiting,
 )
+from firmware_bridge.host.record_report import RecordReport
 from firmware_bridge.host.record_session import Batch, RecordSession, SampleClock
 from firmware_bridge.sources.ports import port_format
-from gfimu.errors import GfimuError, InputError
-from gfimu.files.outputs import RECORDING, check_outputs
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.parts.part import Part
+from gfimu.array.array import AccelerometerArray
+from gfimu.array.parts.part import Part
+from gfimu.base.errors import GfimuError, InputError
+from gfimu.base.files.outputs import RECORDING, check_outputs
+from gfimu.base.version import __version__
 from gfimu.recording.carried_array import array_metadata
-from gfimu.results import TableResult, one_row
 
 __all__ = ["Batch", "RecordReport", "SampleClock", "record"]
 
 _SILENCE_S = 5.0
 _LOST_S = 2.0  # without a frame, after which the speed is looked for again
-
-
-@dataclass(frozen=True)
-class RecordReport(TableResult):
-    """What was recorded.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    duration_s : float
-        From the first to the last sample, board time, s.
-    stream : StreamCounts
-        Samples, lost, corrupt, skipped bytes, restarts of the board.
-    breaks : int
-        Times the connection was lost.
-    clock : ClockFit or None
-        Board clock against host clock.
-    identity : Identity or None
-        What the board said about itself.
-    status_counts : dict of str to int
-        Samples per status bit.
-    faults : tuple of dict
-        Faults of channels that a live view saw (`gfimu.integrity.fault.ChannelFault.entries`).
-    baud : int or None
-        Speed of the line at the end, bits per second.
-    source : dict
-        What a source says of itself (`firmware_bridge.sources`); also in the recording's metadata.
-    array : str
-        Name of the array that the recording carries; empty if nobody stated one.
-    array_stated_by : str
-        ``host``, ``format``, ``board`` or ``answer``; empty if nobody did.
-    board_array : str
-        The array that the board states; empty if it states none.
-    temperature_degC : tuple of float, optional
-        Lowest and highest temperature of the board, °C.
-    """
-
-    path: Path
-    duration_s: float
-    stream: StreamCounts
-    breaks: int
-    clock: ClockFit | None
-    identity: Identity | None
-    status_counts: dict[str, int] = field(default_factory=dict)
-    faults: tuple[dict[str, Any], ...] = ()
-    baud: int | None = None
-    source: dict[str, Any] = field(default_factory=dict)
-    array: str = ""
-    array_stated_by: str = ""
-    board_array: str = ""
-    temperature_degC: tuple[float, float] | None = None
-
-    def to_columns(self) -> dict[str, NDArray[Any]]:
-        """Return one row: file, length, counts of the stream, array."""
-        counts = {name: getattr(self.stream, name) for name in ("samples", "lost", "corrupt", "restarts")}
-        return one_row(
-            {"path": self.path, "duration_s": self.duration_s, **counts, "breaks": self.breaks, "array": self.array}
-        )
-
-    def _heading(self) -> str:
-        return "Recording from a board"
 
 
 def record(
@@ -256,7 +190,7 @@ def _metadata(port: str, layout: FrameFormat, on_board: ArrayOnBoard) -> dict[st
         "port": port,
         "format": layout.name,
         "started_utc": datetime.now(UTC).isoformat(timespec="milliseconds"),
-        "software_version": gfimu.__version__,
+        "software_version": __version__,
         "time_stamp_clock": "board",
         "time_stamp_tick_hz": layout.clock_hz,
     }

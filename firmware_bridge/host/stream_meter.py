@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from firmware_bridge.frames.decoder import StreamCounts
 
 if TYPE_CHECKING:
-    from gfimu.integrity.live.block import StreamState
+    from gfimu.rate.health.live.block import StreamState
 
 __all__ = ["GroupMeans", "StreamMeter"]
 
@@ -109,7 +109,7 @@ class StreamMeter:
 
     def state(self, behind_s: float) -> StreamState:
         """Return the state of the stream; ``behind_s`` is what the rate filter has still to do, s."""
-        from gfimu.integrity.live.block import StreamState
+        from gfimu.rate.health.live.block import StreamState
 
         (begin_s, before), (end_s, after) = self._totals[0], self._totals[-1]
         rate = (after - before) / (end_s - begin_s) if end_s - begin_s >= _COUNT_OVER_S else np.nan

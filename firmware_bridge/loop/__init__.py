@@ -1,1 +1,5 @@
-"""Firmware in the loop: the emulated board in a process of its own, its physics, its port, its runs."""
+"""Firmware in the loop: the emulated board in a process of its own.
+
+In: an image, a motion.
+Out: a virtual port, a recorded run, the outcome of a campaign of faults.
+"""

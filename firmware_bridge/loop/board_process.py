@@ -22,8 +22,9 @@ from firmware_bridge.adxl345.device import Adxl345
 from firmware_bridge.adxl345.registers import TICKS_PER_SECOND, Adxl345Options, LineFault
 from firmware_bridge.loop.physics import Conversions, RestPhysics
 from firmware_bridge.lpc1768.build import IMAGES, image_path
-from gfimu.errors import GfimuError, InputError, did_you_mean
-from gfimu.optional_packages import missing, require
+from gfimu.base.child_process import environment
+from gfimu.base.errors import GfimuError, InputError, did_you_mean
+from gfimu.base.optional_packages import missing, require
 
 __all__ = ["BoardProcess", "emulator_available", "require_emulator"]
 
@@ -91,7 +92,7 @@ class BoardProcess:
         self._process = context.Process(
             target=_work, args=(theirs, path, tuple(chips), self.fast, trace, lose_every, array), daemon=True
         )
-        with _without_main(), _without_interrupt():
+        with environment(), _without_main(), _without_interrupt():
             self._process.start()
         theirs.close()
         self._call("ready")

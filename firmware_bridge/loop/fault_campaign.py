@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,8 @@ from firmware_bridge.frames.commands import Command, encode_command, sample_at
 from firmware_bridge.frames.decoder import LPC1768_DTYPE, FrameType, SampleDecoder, Status, StreamCounts
 from firmware_bridge.loop.board_process import BoardProcess
 from firmware_bridge.loop.physics import Conversions
-from gfimu.results import TableResult, text_column
+from gfimu.base.declared import Declared, Table, cell, figure
+from gfimu.base.results import TableResult, text_column
 
 __all__ = ["FAULTS", "FaultOutcome", "FaultReport", "resample_line", "run_campaign", "run_fault"]
 
@@ -25,55 +26,50 @@ _CHUNK = 700  # bytes the host reads at a time
 
 
 @dataclass(frozen=True)
-class FaultOutcome:
-    """One row of the table.
+class FaultOutcome(Declared):
+    """What the host makes of one fault."""
 
-    Parameters
-    ----------
-    fault : str
-        Name.
-    frames_whole : int
-        Sample frames that reached the host undamaged.
-    frames_decoded : int
-        Sample frames that the host accepted.
-    invented : int
-        Accepted frames that the board never sent.
-    counts : StreamCounts
-        What the host's decoder reports.
-    reported : tuple of str
-        Status bits that the board raised because of the fault.
-    recovered : bool
-        Whether good frames came again after the fault.
-    detail : str
-        What else happened.
-    """
-
-    fault: str
-    frames_whole: int
-    frames_decoded: int
-    invented: int
-    counts: StreamCounts
-    reported: tuple[str, ...]
-    recovered: bool
-    detail: str
+    fault: Annotated[str, figure("Name of the fault.")]
+    frames_whole: Annotated[int, figure("Sample frames that reached the host undamaged.")]
+    frames_decoded: Annotated[int, figure("Sample frames that the host accepted.")]
+    invented: Annotated[int, figure("Accepted frames that the board never sent.")]
+    counts: Annotated[StreamCounts, figure("What the host's decoder reports.")]
+    reported: Annotated[tuple[str, ...], figure("Status bits that the board raised because of the fault.")]
+    recovered: Annotated[bool, figure("Whether good frames came again after the fault.")]
+    detail: Annotated[str, figure("What else happened.")]
 
     @property
-    def passed(self) -> bool:
+    def passed(
+        self,
+    ) -> Annotated[bool, figure("Whether nothing was invented or lost, and good frames came again.")]:
         """Nothing invented, nothing lost that arrived whole, and good frames afterwards."""
         return self.invented == 0 and self.frames_decoded == self.frames_whole and self.recovered
 
 
 @dataclass(frozen=True)
-class FaultReport(TableResult):
-    """What the host makes of each fault; counts and iterates like a list of `FaultOutcome`.
+class FaultReport(Declared, TableResult):
+    """What the host makes of faults of wire, supply and chips; counts and iterates like a list of `FaultOutcome`."""
 
-    Parameters
-    ----------
-    outcomes : tuple of FaultOutcome
-        One per fault.
-    """
+    outcomes: Annotated[tuple[FaultOutcome, ...], figure("The faults.", key="faults")]
 
-    outcomes: tuple[FaultOutcome, ...]
+    @property
+    def passed(self) -> Annotated[bool, figure("Whether every fault passed.", before="outcomes")]:
+        """Whether every fault passed."""
+        return all(one.passed for one in self)
+
+    def shown(self) -> Iterator[Table]:
+        """Yield the table that people read."""
+        rows = [
+            (
+                one.fault.replace("_", " "),
+                *(one.frames_whole, one.frames_decoded, one.invented, one.counts.lost, one.counts.corrupt),
+                ", ".join(one.reported).replace("_", " ") or ("restart" if one.counts.restarts else "-"),
+                cell(one.passed),
+            )
+            for one in self
+        ]
+        header = ("fault", "whole", "decoded", "invented", "lost", "corrupt", "board reports", "passed")
+        yield Table(self._heading(), header, rows, note="Frames: arrived whole, accepted.")
 
     def __len__(self) -> int:
         return len(self.outcomes)

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from firmware_bridge.adxl345.registers import RAW_PER_COUNT, TICKS_PER_SECOND
-from gfimu.errors import InputError
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import InputError
 from sim.chips.adxl345 import Sensor
 
 __all__ = ["Conversions", "RestPhysics", "RidePhysics", "Scene"]

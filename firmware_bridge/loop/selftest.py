@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +14,9 @@ from firmware_bridge.frames.decoder import SampleDecoder, Status
 from firmware_bridge.host.chip_selftest import judge
 from firmware_bridge.loop.board_process import BoardProcess, require_emulator
 from firmware_bridge.lpc1768.build import check_image
-from gfimu.optional_packages import missing
-from gfimu.results import TableResult, text_column
+from gfimu.base.declared import Declared, Table, figure, table
+from gfimu.base.optional_packages import missing
+from gfimu.base.results import TableResult, text_column
 
 __all__ = ["SelfTestReport", "SelfTestRow", "run_selftest"]
 
@@ -27,25 +28,28 @@ _BOOT_S = 0.05
 
 
 @dataclass(frozen=True)
-class SelfTestRow:
-    """One check: its name, whether it passed, and what was measured."""
+class SelfTestRow(Declared):
+    """One check of the self-test."""
 
-    check: str
-    passed: bool
-    measured: str
+    check: Annotated[str, figure("What was checked.", head="check")]
+    passed: Annotated[bool, figure("Whether it passed.", head="passed")]
+    measured: Annotated[str, figure("What was measured.", head="measured")]
 
 
 @dataclass(frozen=True)
-class SelfTestReport(TableResult):
-    """Checks of the emulator and the firmware; counts and iterates like a list of `SelfTestRow`.
+class SelfTestReport(Declared, TableResult):
+    """Self-test of the emulator and the firmware; counts and iterates like a list of `SelfTestRow`."""
 
-    Parameters
-    ----------
-    rows : tuple of SelfTestRow
-        One per check.
-    """
+    rows: Annotated[tuple[SelfTestRow, ...], figure("The checks.", key="checks")]
 
-    rows: tuple[SelfTestRow, ...]
+    @property
+    def passed(self) -> Annotated[bool, figure("Whether every check passed.", before="rows")]:
+        """Whether every check passed."""
+        return all(row.passed for row in self)
+
+    def shown(self) -> Iterator[Table]:
+        """Yield the table that people read."""
+        yield table(self._heading(), self.rows, "check passed measured", left=3)
 
     def __len__(self) -> int:
         return len(self.rows)

@@ -13,15 +13,16 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Annotated, Any, Protocol
 
 from numpy.typing import NDArray
 
 from firmware_bridge.adxl345.registers import TICKS_PER_SECOND
 from firmware_bridge.loop.board_process import BoardProcess
 from firmware_bridge.loop.line_speed import as_received, terminal_baud
-from gfimu.errors import InputError
-from gfimu.results import TableResult, one_row
+from gfimu.base.declared import Declared, Line, Table, figure, figures
+from gfimu.base.errors import InputError
+from gfimu.base.results import TableResult, one_row
 
 __all__ = ["PseudoTerminal", "ServeReport", "TcpPort", "VirtualPort", "open_port", "serve"]
 
@@ -186,30 +187,29 @@ def open_port(port: str) -> VirtualPort:
 
 
 @dataclass(frozen=True)
-class ServeReport(TableResult):
-    """What a virtual board did.
+class ServeReport(Declared, TableResult):
+    """What the emulated board did behind a port."""
 
-    Parameters
-    ----------
-    virtual_s, wall_s : float
-        Virtual and real time, s.
-    sent, refused, received : int
-        Bytes sent, bytes that the host did not take, bytes from the host.
-    warnings : tuple of str
-        What the firmware did that the processor's documents advise against.
-    """
-
-    virtual_s: float
-    wall_s: float
-    sent: int
-    refused: int
-    received: int
-    warnings: tuple[str, ...] = ()
+    virtual_s: Annotated[float, figure("Virtual time.", "s", head="virtual time", form=".2f")]
+    wall_s: Annotated[float, figure("Real time.", "s", head="real time", form=".2f")]
+    sent: Annotated[int, figure("Bytes sent.", "bytes", head="sent")]
+    refused: Annotated[int, figure("Bytes that the host did not take.", "bytes", head="nobody read")]
+    received: Annotated[int, figure("Bytes from the host.", "bytes", head="from the host")]
+    warnings: Annotated[
+        tuple[str, ...], figure("What the firmware did that the processor's documents advise against.")
+    ] = ()
+    port: Annotated[str, figure("The port.")] = ""
 
     def to_columns(self) -> dict[str, NDArray[Any]]:
         """Return one row: virtual and real time, bytes each way."""
         counts = {f"{name}_bytes": getattr(self, name) for name in ("sent", "refused", "received")}
         return one_row({"virtual_s": self.virtual_s, "wall_s": self.wall_s, **counts})
+
+    def shown(self) -> Iterator[Table | Line]:
+        """Yield the tables and sentences that people read."""
+        yield figures(f"Virtual board behind {self.port}", self)
+        for warning in self.warnings:
+            yield Line(f"warning from the board: {warning}", "yellow")
 
     def _heading(self) -> str:
         return "Virtual board behind a port"
@@ -330,4 +330,5 @@ def serve(
             ahead = (now - first) / TICKS_PER_SECOND - (time.monotonic() - began)
             if realtime and ahead > 0:
                 time.sleep(ahead)
-    return ServeReport((now - first) / TICKS_PER_SECOND, time.monotonic() - began, line.sent, line.refused, received)
+    virtual_s, wall_s = (now - first) / TICKS_PER_SECOND, time.monotonic() - began
+    return ServeReport(virtual_s, wall_s, line.sent, line.refused, received, port=port.name)

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-import gfimu
 from firmware_bridge.adxl345.registers import TICKS_PER_SECOND, Adxl345Options
 from firmware_bridge.frames.commands import (
     RATE_CODE_AUTO,
@@ -25,10 +24,12 @@ from firmware_bridge.frames.decoder import SampleDecoder, Samples, StreamCounts
 from firmware_bridge.host.clock import SampleRate
 from firmware_bridge.loop.board_process import BoardProcess
 from firmware_bridge.loop.physics import RidePhysics, Scene
-from gfimu.errors import InputError
+from gfimu.base.declared import Declared, Line, Table, figure
+from gfimu.base.errors import InputError
+from gfimu.base.results import Panel, PlottedResult
+from gfimu.base.version import __version__
 from gfimu.recording import Recording
 from gfimu.recording.carried_array import array_metadata
-from gfimu.results import Panel, RunResult
 
 __all__ = ["VirtualRun", "record_virtual", "typical_chips"]
 
@@ -41,25 +42,24 @@ _CLOCK_ERROR_STD = 0.005
 
 
 @dataclass(frozen=True)
-class VirtualRun(RunResult):
-    """What came of a run.
+class VirtualRun(Declared, PlottedResult):
+    """What the firmware on the emulated board sent, as a recording.
 
     Parameters
     ----------
     recording : Recording
         The samples, in m/s², with the references of the scene.
-    stream : StreamCounts
-        Samples, lost, corrupt.
-    identity : Identity or None
-        What the board said about itself.
-    warnings : tuple of str
-        What the firmware did that the processor's documents advise against.
     """
 
     recording: Recording
-    stream: StreamCounts
-    identity: Identity | None
-    warnings: tuple[str, ...] = ()
+    stream: Annotated[StreamCounts, figure("How the stream came in.")]
+    identity: Annotated[Identity | None, figure("What the board stated about itself.")]
+    warnings: Annotated[
+        tuple[str, ...], figure("What the firmware did that the processor's documents advise against.")
+    ] = ()
+    files: Annotated[Mapping[str, Path], figure("Files and folders that were written, by what they are.")] = field(
+        default_factory=dict
+    )
 
     @property
     def metadata(self) -> Mapping[str, Any]:
@@ -73,6 +73,14 @@ class VirtualRun(RunResult):
     def to_rerun(self, path: str | Path) -> Path:
         """Write the recording as a rerun recording (`gfimu.Recording.to_rerun`)."""
         return self.recording.to_rerun(path)
+
+    def shown(self) -> Iterator[Table | Line]:
+        """Yield the tables and sentences that people read."""
+        rate = self.metadata.get("time_stamp_rate_hz", self.metadata["sample_rate_hz"])
+        recorded = ("recorded", f"{len(self.recording.t_s)} at {rate:.1f} Hz")
+        yield Table(self._heading(), ("quantity", "value"), [recorded, *self._facts()])
+        for warning in self.warnings:
+            yield Line(f"warning from the board: {warning}", "yellow")
 
     def _heading(self) -> str:
         return "Recording of the emulated board"
@@ -174,7 +182,7 @@ def record_virtual(
             "sample_rate_hz": rate_hz,
             "range_g": range_g,
             "source": "emulated LPC1768",
-            "software_version": gfimu.__version__,
+            "software_version": __version__,
             "frames_lost": decoder.counts.lost,
             **({} if identity is None else identity.conversions),
             **rate.metadata(),

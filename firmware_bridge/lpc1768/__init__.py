@@ -1,1 +1,5 @@
-"""The firmware of the LPC1768: C sources (``src``), the built images (``image``) and how they are built."""
+"""The firmware of the LPC1768.
+
+In: C sources (``src``).
+Out: images (``image``) and how they are built.
+"""

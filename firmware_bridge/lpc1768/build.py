@@ -4,23 +4,24 @@ from __future__ import annotations
 
 import hashlib
 import struct
-import subprocess
 import sys
 import tempfile
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import tomli_w
 from numpy.typing import NDArray
 
 from firmware_bridge.lpc1768.elf import ElfImage
-from gfimu.errors import GfimuError, InputError, did_you_mean
-from gfimu.files.atomic_file import atomic_path, write_text
-from gfimu.optional_packages import require
-from gfimu.results import TableResult, one_row
+from gfimu.base.child_process import run_module
+from gfimu.base.declared import Declared, Table, figure, figures
+from gfimu.base.errors import GfimuError, InputError, did_you_mean
+from gfimu.base.files.atomic_file import atomic_path, write_text
+from gfimu.base.optional_packages import require
+from gfimu.base.results import TableResult, one_row
 
 __all__ = [
     "ARRAY_SYMBOL",
@@ -62,55 +63,36 @@ _UNPROTECTED = b"\xff\xff\xff\xff"
 
 
 @dataclass(frozen=True)
-class BuildReport(TableResult):
-    """One built image.
+class BuildReport(Declared, TableResult):
+    """A built image."""
 
-    Parameters
-    ----------
-    name : str
-        Image name.
-    elf, binary : Path
-        The ELF file (with symbols) and the raw image for the flash.
-    sha256 : str
-        Hash of the ELF file.
-    source_sha256 : str
-        Hash of the sources, linker script, flags and definitions.
-    compiler : str
-        Compiler and version.
-    text_bytes, data_bytes, bss_bytes : int
-        Flash and memory used.
-    defines : mapping of str to str
-        Preprocessor definitions beyond the defaults.
-    """
-
-    name: str
-    elf: Path
-    binary: Path
-    sha256: str
-    source_sha256: str
-    compiler: str
-    text_bytes: int
-    data_bytes: int
-    bss_bytes: int
-    defines: Mapping[str, str] = field(default_factory=dict)
+    name: Annotated[str, figure("Name of the image.")]
+    elf: Annotated[Path, figure("ELF file, with symbols.")]
+    binary: Annotated[Path, figure("Raw image for the flash.")]
+    sha256: Annotated[str, figure("Hash of the ELF file.", head="SHA-256")]
+    source_sha256: Annotated[str, figure("Hash of the sources, linker script, flags and definitions.")]
+    compiler: Annotated[str, figure("Compiler and version.", head="compiler")]
+    text_bytes: Annotated[int, figure("Code and constants, in flash.", "bytes", head="code and constants")]
+    data_bytes: Annotated[int, figure("Initialised memory.", "bytes", head="initialised memory")]
+    bss_bytes: Annotated[int, figure("Zeroed memory, without the stack.", "bytes", head="zeroed memory")]
+    defines: Annotated[Mapping[str, str], figure("Preprocessor definitions beyond the defaults.")] = field(
+        default_factory=dict
+    )
 
     def to_columns(self) -> dict[str, NDArray[Any]]:
         """Return one row: files, hashes, compiler, bytes of flash and memory."""
         return one_row({name: value for name, value in vars(self).items() if name != "defines"})
 
+    def shown(self) -> Iterator[Table]:
+        """Yield the table that people read."""
+        yield figures(self._heading(), self)
+
     def _heading(self) -> str:
         return f"Image {self.name}"
 
     def _facts(self) -> list[tuple[str, str]]:
-        return [
-            ("compiler", self.compiler),
-            ("code and constants", f"{self.text_bytes} bytes of flash"),
-            ("memory", f"{self.data_bytes + self.bss_bytes} bytes, and the stack"),
-            ("SHA-256", self.sha256),
-            ("ELF file", str(self.elf)),
-            ("image for the flash", str(self.binary)),
-            *self.defines.items(),
-        ]
+        files = [("ELF file", str(self.elf)), ("image for the flash", str(self.binary))]
+        return [*self.facts(), *files, *self.defines.items()]
 
     def _shown(self) -> None:
         return None
@@ -273,9 +255,7 @@ def build_host_library(out: str | Path, *, array: str = "") -> Path:
 
 
 def _zig(*arguments: str, cwd: Path) -> str:
-    run = subprocess.run(
-        [sys.executable, "-m", "ziglang", *arguments], cwd=cwd, capture_output=True, text=True, check=False
-    )
+    run = run_module("ziglang", *arguments, cwd=cwd, text=True)
     if run.returncode:
         raise GfimuError(f"the C compiler failed:\n{run.stderr.strip()}")
     return run.stdout

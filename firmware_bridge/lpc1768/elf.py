@@ -7,7 +7,7 @@ import struct
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from gfimu.errors import InputError
+from gfimu.base.errors import InputError
 
 __all__ = ["ElfImage", "Segment"]
 

@@ -6,7 +6,7 @@ import tempfile
 from pathlib import Path
 
 from firmware_bridge.lpc1768.build import SOURCES
-from gfimu.errors import InputError
+from gfimu.base.errors import InputError
 
 __all__ = ["readme", "write_project"]
 

@@ -1,7 +1,7 @@
 """Chips with sample clocks of their own on one time base: brought to the sample times of the first, as they come.
 
 Between its samples a chip is interpolated by a cubic spline, as the files of several chips are
-(`gfimu.importing.piece`). What that adds is known: the spline's frequency response on a uniform grid (Unser,
+(`gfimu.recording.importing.piece`). What that adds is known: the spline's frequency response on a uniform grid (Unser,
 IEEE Signal Processing Magazine 16(6):22, 1999).
 """
 
@@ -66,7 +66,7 @@ class _Chip:
 
     def at(self, t_s: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the readings (m, 3) at other times (m,); NaN in gaps and outside."""
-        from gfimu.importing.piece import at_times  # see `ChipMerger`
+        from gfimu.recording.importing.piece import at_times  # see `ChipMerger`
 
         if not len(t_s):
             return np.empty((0, 3))
@@ -94,7 +94,7 @@ class ChipMerger:
         self._chips = [_Chip() for _ in names]
         self._have_begun = False
         if len(names) > 1:
-            for module in ("scipy.interpolate", "gfimu.importing.piece"):
+            for module in ("scipy.interpolate", "gfimu.recording.importing.piece"):
                 importlib.import_module(module)  # takes seconds, for which no sample should wait
 
     def start_anew(self) -> None:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from firmware_bridge.frames.frame_format import FrameFormat
 from firmware_bridge.sources.source import pack_samples
-from gfimu.errors import GfimuError, InputError
+from gfimu.base.errors import GfimuError, InputError
 
 __all__ = ["PhyphoxSource"]
 

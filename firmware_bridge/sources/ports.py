@@ -8,8 +8,8 @@ from firmware_bridge.sources.klipper import KlipperSource, klipper_chips
 from firmware_bridge.sources.phyphox import PhyphoxSource
 from firmware_bridge.sources.source import Source, sample_format
 from firmware_bridge.sources.udp import UdpSource
-from gfimu.errors import InputError
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import InputError
 
 __all__ = ["has_own_samples", "port_format", "source_of"]
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from firmware_bridge.frames.frame_format import FrameFormat
 from firmware_bridge.frames.packets import PacketLayout
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.array.array import AccelerometerArray
 
 __all__ = ["Source", "pack_samples", "sample_format"]
 

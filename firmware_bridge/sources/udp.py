@@ -10,7 +10,7 @@ import numpy as np
 
 from firmware_bridge.frames.frame_format import FrameFormat
 from firmware_bridge.frames.text_lines import TextLayout
-from gfimu.errors import InputError
+from gfimu.base.errors import InputError
 
 __all__ = ["UdpSource"]
 

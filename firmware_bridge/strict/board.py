@@ -194,7 +194,7 @@ class StrictBoard(Board):
     ) -> None:
         self.ledger = Ledger(image.symbol_at, self._here)
         self._stuck = STUCK[stuck] if stuck is not None else None
-        self._policy = policy or Policy()
+        self.policy = policy or Policy()
         self.watches: list[Watch] = []
         image, self.started_at = started_by_loader(image)
         super().__init__(image, sensors, tracer=self)
@@ -217,7 +217,7 @@ class StrictBoard(Board):
         return self.cpu
 
     def _map(self) -> None:
-        self.watches = [watch(self, self.ledger, self._policy) for watch in WATCHES]
+        self.watches = [watch(self, self.ledger, self.policy) for watch in WATCHES]
         self._by_block = [watch for watch in self.watches if type(watch).block is not Watch.block]
         self._by_exception = [watch for watch in self.watches if type(watch).exception is not Watch.exception]
         self._observed = {peripheral.base: self._observers(peripheral) for peripheral in self.peripherals}

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,13 +14,15 @@ from numpy.typing import NDArray
 from firmware_bridge.loop.board_process import require_emulator
 from firmware_bridge.strict.findings import Finding
 from firmware_bridge.strict.image import load_image
-from gfimu.errors import GfimuError, InputError
-from gfimu.results import TableResult, text_column
+from gfimu.base.child_process import run_module
+from gfimu.base.declared import Declared, Line, Table, figure
+from gfimu.base.errors import GfimuError, InputError
+from gfimu.base.results import TableResult, text_column
 
 __all__ = ["CheckOptions", "CheckReport", "check_image"]
 
 _CHIPS = 4
-_CHILD = ("-P", "-m", "firmware_bridge.strict.worker")
+_CHILD = "firmware_bridge.strict.worker"
 
 
 @dataclass(frozen=True)
@@ -59,53 +59,43 @@ class CheckOptions:
 
 
 @dataclass(frozen=True)
-class CheckReport(TableResult):
-    """What came of a check.
+class CheckReport(Declared, TableResult):
+    """An image on the strict board."""
 
-    Parameters
-    ----------
-    image : str
-        The image.
-    virtual_s : float
-        Virtual time that was run, s.
-    ended : str
-        Why the run ended before its time; empty if it did not.
-    accesses, exceptions, resets : int
-        Register accesses, exceptions handled, resets after the first start.
-    sent : tuple of int
-        Bytes that each UART sent.
-    baud : tuple of float
-        Speed of each UART at the end, baud.
-    character : tuple of str
-        Bits, parity and stop bits of each UART at the end, as in ``8N1``.
-    stack_bytes : int or None
-        Bytes of the main stack that were used; None if the image does not say where it ends.
-    stack_room : int or None
-        Bytes between the top of the main stack and the data below it.
-    started_at : int
-        Address of the vector table; not 0 for an image that a boot loader starts.
-    findings : tuple of Finding
-        Rules broken: faults first, then in the order of their times.
-    """
-
-    image: str
-    virtual_s: float
-    ended: str
-    accesses: int
-    exceptions: int
-    resets: int
-    sent: tuple[int, ...]
-    baud: tuple[float, ...]
-    character: tuple[str, ...]
-    stack_bytes: int | None
-    stack_room: int | None
-    started_at: int
-    findings: tuple[Finding, ...]
+    image: Annotated[str, figure("The image.")]
+    virtual_s: Annotated[float, figure("Virtual time.", "s")]
+    ended: Annotated[str, figure("Why the run ended before its time; empty if it did not.")]
+    accesses: Annotated[int, figure("Register accesses.")]
+    exceptions: Annotated[int, figure("Exceptions handled.")]
+    resets: Annotated[int, figure("Resets after the first start.")]
+    sent: Annotated[tuple[int, ...], figure("Bytes that each UART sent.", "bytes")]
+    baud: Annotated[tuple[float, ...], figure("Speed of each UART at the end.", "bit/s")]
+    character: Annotated[tuple[str, ...], figure("Bits, parity and stop bits of each UART, as in 8N1.")]
+    stack_bytes: Annotated[int | None, figure("Main stack that was used; null if not known.", "bytes")]
+    stack_room: Annotated[int | None, figure("Room of the main stack; null if not known.", "bytes")]
+    started_at: Annotated[int, figure("Address of the vector table; not 0 for an image that a boot loader starts.")]
+    findings: Annotated[tuple[Finding, ...], figure("Rules broken: faults first, then in the order of their times.")]
 
     @property
-    def faults(self) -> int:
+    def faults(self) -> Annotated[int, figure("Findings that are faults.")]:
         """Findings that are faults."""
         return sum(finding.severity == "fault" for finding in self.findings)
+
+    def shown(self) -> Iterator[Table | Line | str]:
+        """Yield the tables and sentences that people read."""
+        yield Table(self._heading(), ("quantity", "value"), self._facts())
+        by_rule: dict[str, list[Finding]] = {}
+        for finding in self.findings:
+            by_rule.setdefault(finding.rule.replace("_", " "), []).append(finding)
+        if by_rule:
+            header = ("rule", "severity", "count", "first at", "what")
+            yield Table("findings", header, [_row(rule, places) for rule, places in by_rule.items()], left=5)
+            for rule, places in by_rule.items():
+                yield f"{rule}: {places[0].remedy} ({places[0].source})"
+        else:
+            yield Line("no rule broken", "green")
+        if self.ended:
+            yield Line(f"the run ended early: {self.ended}", "yellow")
 
     def to_columns(self) -> dict[str, NDArray[Any]]:
         """Return one row per finding: rule, severity, where, how often, what to do, and the document that says so."""
@@ -125,7 +115,8 @@ class CheckReport(TableResult):
         return f"{self.image} on the strict board"
 
     def _facts(self) -> list[tuple[str, str]]:
-        counts = [(name, str(getattr(self, name))) for name in ("accesses", "exceptions", "resets")]
+        started = [("started", f"at {self.started_at:#x}, as by a boot loader")] if self.started_at else []
+        counts = {"register accesses": self.accesses, "exceptions": self.exceptions, "resets": self.resets}
         sent = [
             (f"sent by UART{n}", f"{count} bytes, {self.baud[n]:.0f} baud {self.character[n]}")
             for n, count in enumerate(self.sent)
@@ -134,14 +125,23 @@ class CheckReport(TableResult):
         stack = f"{self.stack_bytes} of {self.stack_room} bytes used"
         return [
             ("virtual time", f"{self.virtual_s:.4g} s"),
-            *counts,
-            *sent,
+            *started,
+            *((name, str(count)) for name, count in counts.items()),
+            *(sent or [("sent", "nothing")]),
             *([] if self.stack_room is None else [("main stack", stack)]),
         ]
 
     def _notes(self) -> tuple[str, ...]:
         rules = () if self.findings else ("No rule is broken.",)
         return (*rules, *((f"The run ended early: {self.ended}.",) if self.ended else ()))
+
+
+def _row(rule: str, places: Sequence[Finding]) -> tuple[str, ...]:
+    """Return the row of a rule: its first place, and how often it was broken."""
+    first = min(places, key=lambda finding: finding.time_s)
+    where = f"{first.pc:#x} {first.symbol}".rstrip()
+    count = sum(finding.count for finding in places)
+    return rule, first.severity, str(count), f"{where}, {first.time_s:.6f} s", first.what
 
 
 def check_image(image: str | Path = "gfimu", options: CheckOptions | None = None) -> CheckReport:
@@ -162,11 +162,7 @@ def check_image(image: str | Path = "gfimu", options: CheckOptions | None = None
     require_emulator()
     load_image(image)  # so that a wrong image is refused here, in one line
     request: dict[str, Any] = {"image": str(image), **asdict(options or CheckOptions())}
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-    run = subprocess.run(
-        [sys.executable, *_CHILD],
-        input=json.dumps(request), capture_output=True, text=True, check=False, env=environment,
-    )  # fmt: skip
+    run = run_module(_CHILD, input=json.dumps(request), text=True)
     if run.returncode:
         last = (run.stderr.strip().splitlines() or ["no message"])[-1]
         raise GfimuError(f"{image}: the strict board has ended: {last}")

@@ -5,6 +5,9 @@ from __future__ import annotations
 import enum
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Annotated
+
+from gfimu.base.declared import Declared, figure
 
 __all__ = ["Finding", "Ledger", "Place", "Rule", "Severity"]
 
@@ -60,41 +63,19 @@ class Place:
 
 
 @dataclass(frozen=True)
-class Finding:
-    """A rule that was broken at one place of the program.
+class Finding(Declared):
+    """A rule that was broken at one place of the program."""
 
-    Parameters
-    ----------
-    rule : str
-        Name of the rule.
-    severity : str
-        ``fault`` or ``warning``.
-    what : str
-        What happened, the first time.
-    pc : int
-        Address of the instruction.
-    symbol : str
-        Function and offset, where the image has symbols.
-    exception : int
-        Exception that was handled; 0 in the main program.
-    time_s : float
-        Virtual time of the first time, s.
-    count : int
-        How often at this place.
-    remedy, source : str
-        What to do, and the document that says so.
-    """
-
-    rule: str
-    severity: str
-    what: str
-    pc: int
-    symbol: str
-    exception: int
-    time_s: float
-    count: int
-    remedy: str
-    source: str
+    rule: Annotated[str, figure("Name of the rule.")]
+    severity: Annotated[str, figure("fault or warning.")]
+    what: Annotated[str, figure("What happened, the first time.")]
+    pc: Annotated[int, figure("Address of the instruction.")]
+    symbol: Annotated[str, figure("Function and offset, where the image has symbols.")]
+    exception: Annotated[int, figure("Exception that was handled; 0 in the main program.")]
+    time_s: Annotated[float, figure("Virtual time of the first time.", "s")]
+    count: Annotated[int, figure("How often at this place.")]
+    remedy: Annotated[str, figure("What to do.")]
+    source: Annotated[str, figure("Document that says so.")]
 
 
 @dataclass

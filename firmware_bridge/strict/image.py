@@ -8,7 +8,7 @@ from pathlib import Path
 from firmware_bridge.board.cpu import AHB_RAM_BASE, AHB_RAM_SIZE, FLASH_SIZE, RAM_BASE, RAM_SIZE
 from firmware_bridge.lpc1768.build import IMAGES, image_path
 from firmware_bridge.lpc1768.elf import ElfImage, Segment
-from gfimu.errors import InputError
+from gfimu.base.errors import InputError
 
 __all__ = ["load_image", "started_by_loader"]
 

@@ -1,6 +1,5 @@
-"""Search of accelerometer arrays for a volume, a number of chips and an objective.
+"""Design of arrays: the figures of merit of one, and the search for the best.
 
-`search.optimize` is the way in. From the lowest floor up: `shapes`, `problem` (what may be built), `criteria` and
-`objectives` (what is to be small), `exchange` and `polish` (how it is made small), `certificate` (how small it can be
-at all), `search`, `front` (two objectives), `pictures`; `brief` is the file in which a designer writes all of it.
+In: an array to score, or a brief: volume, number of chips, objective.
+Out: `Score`, the best array with a bound on what any array could reach, a front of two objectives.
 """

@@ -11,14 +11,14 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.array.array import AccelerometerArray
 from gfimu.array_search.objectives import Conditions
 from gfimu.array_search.problem import Problem, Sites, Tolerance
 from gfimu.array_search.shapes import Shape, box, cylinder, sphere
-from gfimu.errors import InputError
-from gfimu.files.input_file import check_input
-from gfimu.files.model_files import read_toml
-from gfimu.files.schema import NotNegative, Positive, Table, Triple, about, read
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.base.errors import InputError
+from gfimu.base.files.input_file import check_input
+from gfimu.base.files.model_files import read_toml
+from gfimu.base.files.schema import NotNegative, Positive, Table, Triple, about, read
 
 __all__ = [
     "BoxTable",

@@ -34,7 +34,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +42,7 @@ from numpy.typing import NDArray
 from gfimu.array_search.criteria import Criterion, FaultCriterion, KappaCriterion, TraceCriterion
 from gfimu.array_search.problem import Problem, Sites, rows_of
 from gfimu.array_search.shapes import LATTICE, frames_across
+from gfimu.base.declared import Declared, figure
 
 __all__ = ["Certificate", "certify"]
 
@@ -57,26 +58,12 @@ _FEWEST_POINTS = 150  # points of a curved volume from which weights are sought;
 
 
 @dataclass(frozen=True)
-class Certificate:
-    """A proven lower bound of the figure, and how near the search came.
+class Certificate(Declared):
+    """A proven lower bound of the figure, and how near the search came."""
 
-    Parameters
-    ----------
-    bound : float
-        No design has a smaller figure; in the unit of the objective.
-    gap : float
-        Figure of the design over the bound, less one.
-    reason : str
-        What the bound rests on.
-    """
-
-    bound: float
-    gap: float
-    reason: str
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the content for JSON."""
-        return {"bound": self.bound, "gap": self.gap, "reason": self.reason}
+    bound: Annotated[float, figure("No array has a smaller figure, in the unit of the objective.")]
+    gap: Annotated[float, figure("Figure of the array over the bound, less one.")]
+    reason: Annotated[str, figure("What the bound rests on.")]
 
     @property
     def text(self) -> str:

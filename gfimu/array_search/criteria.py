@@ -221,7 +221,7 @@ class FaultCriterion:
     """Least fault of the worst channel that is seen, ``least`` / √(1 − leverage).
 
     The whitened null space Z of J has |z_i|² = 1 − h_i for channel i, with h_i = J_i (JᵀJ)⁻¹ J_iᵀ its leverage; with
-    equal white noise the information on a fault of that channel is proportional to it (`gfimu.integrity.detectable`).
+    equal white noise the information on a fault of that channel is proportional to it (`gfimu.rate.health.detectable`).
     """
 
     least: float

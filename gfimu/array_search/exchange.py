@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from gfimu.array_search.criteria import Goal
 from gfimu.array_search.problem import Candidates, Design, Problem, rows_of
 
-__all__ = ["drawn_rows", "exchange", "figure"]
+__all__ = ["drawn_rows", "exchange", "log_figure"]
 
 _Vector = NDArray[np.float64]
 
@@ -35,7 +35,7 @@ def drawn_rows(problem: Problem, positions: _Vector, axes: _Vector, chip: NDArra
     return rows_of(places[:, :, None], rotated)
 
 
-def figure(problem: Problem, goal: Goal, design: Design) -> float:
+def log_figure(problem: Problem, goal: Goal, design: Design) -> float:
     """Logarithm of the figure of a design, the worst over the draws of the tolerance where they count."""
     rows = drawn_rows(problem, design.positions, design.axes, np.arange(problem.n_chips))
     return goal.exact(rows.reshape(len(rows), -1, 12))
@@ -52,12 +52,12 @@ def exchange(
     n = problem.n_chips
     choices = _Choices(problem, goal, pool)
     least = _GAIN_BEFORE_POLISH if problem.shape is not None or problem.turns else _GAIN
-    best = figure(problem, goal, design)
+    best = log_figure(problem, goal, design)
     quiet = 0  # chips in a row that stayed
     for chip in (int(one) for _ in range(_MOST_SWEEPS) for one in rng.permutation(n)):
         trial = choices.best(design, chip, best - least)
         if trial is not None:
-            value = figure(problem, goal, trial)  # without the rounding of the update
+            value = log_figure(problem, goal, trial)  # without the rounding of the update
             if value < best - least:
                 design, best, quiet = trial, value, 0
                 continue

@@ -9,29 +9,31 @@ Arrays in a concave stretch of the front (in logarithms) are not found that way.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.array.array import AccelerometerArray
 from gfimu.array_search.certificate import certify
 from gfimu.array_search.criteria import Goal
-from gfimu.array_search.exchange import figure
-from gfimu.array_search.objectives import OBJECTIVES, WORST, Conditions, Objective, objective
+from gfimu.array_search.exchange import log_figure
+from gfimu.array_search.objectives import OBJECTIVES, WORST, Aim, Conditions, Objective, objective
 from gfimu.array_search.problem import Design, Problem, Sites
 from gfimu.array_search.search import best_design
-from gfimu.errors import InputError, unknown_name
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.results import Panel, PlottedResult, Series, text_column
-from gfimu.short_repr import short_repr
+from gfimu.base.declared import Declared, Numbers, Table, cell, figure
+from gfimu.base.errors import InputError, unknown_name
+from gfimu.base.results import Panel, PlottedResult, Series, text_column
+from gfimu.base.short_repr import short_repr
 
 __all__ = ["CHIPS", "SIZE", "Front", "FrontPoint", "find_front"]
 
 CHIPS, SIZE = "chips", "size"
 """Objectives of a front alone: the number of chips, and the longest edge around the volume."""
 
+_STEPPED = {CHIPS: ("number of chips", ""), SIZE: ("longest edge of the volume", "m")}
 _WEIGHTS = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 _SIZES = (1.0, 0.85, 0.7, 0.6, 0.5, 0.4, 0.3)  # of the volume of the brief
 _KICKS = 1  # of each start: neighbours on the front are starts besides
@@ -40,40 +42,33 @@ _ALIKE = 1e-4  # relative: points nearer than this in both figures are one
 
 
 @dataclass(frozen=True)
-class FrontPoint:
-    """One array of the front.
-
-    Parameters
-    ----------
-    array : AccelerometerArray
-        The array.
-    values : tuple of float
-        Its two figures.
-    bounds : tuple of (float or None)
-        Proven lower bounds of the figures.
-    starts, agreeing : int
-        Starts made for it, and how many ended at the same compromise.
-    """
+class FrontPoint(Declared):
+    """An array of the front."""
 
     array: AccelerometerArray
-    values: tuple[float, float]
-    bounds: tuple[float | None, float | None]
-    starts: int
-    agreeing: int
+    values: Annotated[tuple[float, float], figure("Its two figures.")]
+    bounds: Annotated[
+        tuple[float | None, float | None], figure("Proven least of each figure alone; null: none.", json=Numbers)
+    ]
+    starts: Annotated[int, figure("Starts that were made for it.")]
+    agreeing: Annotated[int, figure("Starts that ended at it.")]
 
     __repr__ = short_repr
 
+    @property
+    def name(self) -> Annotated[str, figure("Name of its array file.", key="array", before="values")]:
+        """Name of the array."""
+        return self.array.name
+
+    @property
+    def chips(self) -> Annotated[int, figure("Chips.", before="values")]:
+        """Number of chips."""
+        return len(self.array.chips)
+
 
 @dataclass(frozen=True)
-class Front(PlottedResult):
+class Front(Declared, PlottedResult):
     """Pareto front: arrays of which none is worse than another in both objectives, ordered by the first.
-
-    Parameters
-    ----------
-    names, meanings, units : tuple of str
-        The two objectives.
-    points : tuple of FrontPoint
-        The arrays.
 
     Examples
     --------
@@ -81,55 +76,53 @@ class Front(PlottedResult):
     >>> gfimu.optimize(4, most_chips=6, pareto=("chips", "gdop")).to_pandas()  # doctest: +SKIP
     """
 
-    names: tuple[str, str]
-    meanings: tuple[str, str]
-    units: tuple[str, str]
-    points: tuple[FrontPoint, ...]
+    objectives: Annotated[tuple[Aim, Aim], figure("The two objectives.")]
+    points: Annotated[tuple[FrontPoint, ...], figure("The arrays.")]
 
     __repr__ = short_repr
 
+    @property
+    def values(self) -> NDArray[np.float64]:
+        """Both figures of every array, shape (p, 2)."""
+        return np.array([point.values for point in self.points], dtype=float).reshape(-1, 2)
+
     def to_columns(self) -> dict[str, NDArray[Any]]:
         """Return one row per array: chips, and both figures, their unit in the names where they have one."""
-        values = np.array([point.values for point in self.points], dtype=float).reshape(-1, 2)
-        names = [f"{name} [{unit}]" if unit else name for name, unit in zip(self.names, self.units, strict=True)]
+        names = [f"{one.name} [{one.unit}]" if one.unit else one.name for one in self.objectives]
         return {
-            "array": text_column(point.array.name for point in self.points),
-            "chips": np.array([len(point.array.chips) for point in self.points], dtype=int),
-            **{name: values[:, place] for place, name in enumerate(names)},
+            "array": text_column(point.name for point in self.points),
+            "chips": np.array([point.chips for point in self.points], dtype=int),
+            **dict(zip(names, self.values.T, strict=True)),
         }
 
     def _heading(self) -> str:
-        return f"Arrays of least {self.names[0]} and {self.names[1]}"
+        return f"Arrays of least {self.objectives[0].name} and {self.objectives[1].name}"
 
     def _facts(self) -> list[tuple[str, str]]:
-        return list(zip(self.names, self.meanings, strict=True))
+        return [(one.name, one.meaning) for one in self.objectives]
 
     def _panels(self) -> list[Panel]:
-        values = np.array([point.values for point in self.points], dtype=float).reshape(-1, 2)
-        x_label, y_label = (
-            f"{name}, {unit or 'pure number'}" for name, unit in zip(self.names, self.units, strict=True)
-        )
-        return [Panel("front", y_label, (Series("", values[:, 1]),), values[:, 0], x_label)]
+        x_label, y_label = (f"{one.name}, {one.unit or 'pure number'}" for one in self.objectives)
+        return [Panel("front", y_label, (Series("", self.values[:, 1]),), self.values[:, 0], x_label)]
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the content of ``front.json``."""
-        return {
-            "objectives": [
-                {"name": name, "meaning": meaning, "unit": unit}
-                for name, meaning, unit in zip(self.names, self.meanings, self.units, strict=True)
-            ],
-            "points": [
-                {
-                    "array": point.array.name,
-                    "chips": len(point.array.chips),
-                    "values": list(point.values),
-                    "bounds": list(point.bounds),
-                    "starts": point.starts,
-                    "agreeing": point.agreeing,
-                }
+    def shown(self) -> Iterator[Table]:
+        """Yield the table of the arrays."""
+        first, second = self.objectives
+        yield Table(
+            f"Front of {first.meaning} and {second.meaning}",
+            ("array", first.label, second.label, "starts that agree", "bounds"),
+            [
+                (
+                    point.name,
+                    *(cell(value, ".5g") for value in point.values),
+                    f"{point.agreeing} of {point.starts}",
+                    "  ".join(cell(math.nan if bound is None else bound, ".5g") for bound in point.bounds),
+                )
                 for point in self.points
             ],
-        }
+            note="No array of the table is worse than another in both. Bounds: proven least of each figure alone; "
+            "—: none.",
+        )
 
 
 def find_front(
@@ -179,23 +172,22 @@ def find_front(
         )
     if not stepped:
         points = _weighed(problem, conditions, names, rng, starts, report)
-        meanings = [objective(name, problem, conditions) for name in names]
-        texts, units = [one.meaning for one in meanings], [one.unit for one in meanings]
+        aims: list[Aim] = [objective(name, problem, conditions) for name in names]
     else:
         other = names[0] if names[1] == stepped[0] else names[1]
         steps = _sizes(problem) if stepped[0] == SIZE else _numbers(problem, most_chips)
         points = _stepped(steps, conditions, other, rng, starts, report)
         goal = objective(other, problem, conditions)
-        label = ("number of chips", "") if stepped[0] == CHIPS else ("longest edge of the volume", "m")
-        texts, units = [label[0], goal.meaning], [label[1], goal.unit]
+        meaning, unit = _STEPPED[stepped[0]]
+        aims = [Aim(stepped[0], meaning, unit), goal]
         if names[1] == stepped[0]:
-            texts, units = texts[::-1], units[::-1]
+            aims.reverse()
             points = [replace(one, values=one.values[::-1], bounds=one.bounds[::-1]) for one in points]
     kept = [
         replace(point, array=replace(point.array, name=f"front_{number:02d}"))
         for number, point in enumerate(_undominated(points), start=1)
     ]
-    return Front(names, (texts[0], texts[1]), (units[0], units[1]), tuple(kept))
+    return Front((aims[0], aims[1]), tuple(kept))
 
 
 def _weighed(
@@ -220,10 +212,13 @@ def _weighed(
             starts=starts,
             kicks=_KICKS,
             also=last,
-            report=_part(report, number, len(_WEIGHTS), starts + 1),
+            report=_part(report, number, len(_WEIGHTS)),
         )
         last = (end.design,)
-        values = (math.exp(figure(problem, goals[0], end.design)), math.exp(figure(problem, goals[1], end.design)))
+        values = (
+            math.exp(log_figure(problem, goals[0], end.design)),
+            math.exp(log_figure(problem, goals[1], end.design)),
+        )
         text = f"compromise of {first.meaning} and {second.meaning}"
         array = problem.array(end.design, "front", conditions.part, text)
         bounds = (_bound(problem, first, values[0]), _bound(problem, second, values[1]))
@@ -242,10 +237,8 @@ def _stepped(
     found = []
     for number, (step, problem) in enumerate(steps):
         wanted = objective(name, problem, conditions)
-        end = best_design(
-            problem, Goal(wanted.sought()), rng, starts=starts, report=_part(report, number, len(steps), starts)
-        )
-        value = math.exp(figure(problem, wanted.goal, end.design))
+        end = best_design(problem, Goal(wanted.sought()), rng, starts=starts, report=_part(report, number, len(steps)))
+        value = math.exp(log_figure(problem, wanted.goal, end.design))
         text = f"least {wanted.meaning} found for {problem.n_chips} chips in {problem.volume.name}"
         array = problem.array(end.design, "front", conditions.part, text)
         bounds = (None, _bound(problem, wanted, value))
@@ -279,8 +272,8 @@ def _bound(problem: Problem, wanted: Objective, value: float) -> float | None:
     return None if found is None else found.bound
 
 
-def _part(report: Callable[[float], None] | None, number: int, of: int, starts: int) -> Callable[[int], None] | None:
-    return None if report is None else lambda made: report((number + min(1.0, made / starts)) / of)
+def _part(report: Callable[[float], None] | None, number: int, of: int) -> Callable[[float], None] | None:
+    return None if report is None else lambda share: report((number + share) / of)
 
 
 def _undominated(points: Sequence[FrontPoint]) -> list[FrontPoint]:

@@ -5,22 +5,24 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.array.parts.part import Part
+from gfimu.array.parts.part_file import PartFile
 from gfimu.array_search.criteria import Criterion, FaultCriterion, Goal, KappaCriterion, Term, TraceCriterion
 from gfimu.array_search.problem import Problem
-from gfimu.bounds.sample import omega_products_jacobian
-from gfimu.errors import GeometryError, InputError, unknown_name
-from gfimu.integrity.detectable import least_fault
-from gfimu.parts.part import Part
-from gfimu.parts.part_file import PartFile
-from gfimu.position_drift import ErrorSources
-from gfimu.position_drift.weight import drift_weight
-from gfimu.units import MILLI_G
+from gfimu.base.declared import Declared, figure
+from gfimu.base.errors import GeometryError, InputError, unknown_name
+from gfimu.base.units import MILLI_G
+from gfimu.budget.drift import ErrorSources
+from gfimu.budget.drift.weight import drift_weight
+from gfimu.rate.bounds.sample import omega_products_jacobian
+from gfimu.rate.health.detectable import least_fault
 
-__all__ = ["OBJECTIVES", "WORST", "Conditions", "Objective", "objective"]
+__all__ = ["OBJECTIVES", "WORST", "Aim", "Conditions", "Objective", "Reached", "objective"]
 
 WORST = "_worst"
 """Ending of the name of an objective that is judged by the worst draw of the tolerance."""
@@ -92,24 +94,30 @@ class Conditions:
 
 
 @dataclass(frozen=True)
-class Objective:
-    """A figure to be small.
+class Aim(Declared):
+    """What is made small."""
 
-    Parameters
-    ----------
-    name : str
-        Its name, with `WORST` at the end where the worst draw counts.
-    meaning : str
-        What it is, in words.
-    unit : str
-        Its unit; empty for a pure number.
-    criterion : Criterion
-        Its logarithm as a function of a design.
-    """
+    name: Annotated[str, figure("Its name, with _worst at the end where the worst draw counts.")]
+    meaning: Annotated[str, figure("In words.")]
+    unit: Annotated[str, figure("Its unit; empty of a ratio.")]
 
-    name: str
-    meaning: str
-    unit: str
+    @property
+    def label(self) -> str:
+        """Name and unit."""
+        return f"{self.name}, {self.unit}" if self.unit else self.name
+
+
+@dataclass(frozen=True)
+class Reached(Aim):
+    """What was made small, and how small it is."""
+
+    value: Annotated[float, figure("Its value, in that unit.")]
+
+
+@dataclass(frozen=True)
+class Objective(Aim):
+    """A figure to be small, whose logarithm is a criterion of a design."""
+
     criterion: Criterion
 
     @property

@@ -10,12 +10,12 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
+from gfimu.array.array import AccelerometerArray
 from gfimu.array_search.front import CHIPS, Front
 from gfimu.array_search.problem import Problem, Sites
 from gfimu.array_search.shapes import Shape
-from gfimu.files.atomic_file import atomic_path
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.visual.colours import AFTER_ON_PAPER, BEFORE_ON_PAPER, INK, NOISE_ON_PAPER, PALE, chip_colour, css
+from gfimu.base.files.atomic_file import atomic_path
+from gfimu.base.results.colours import AFTER_ON_PAPER, BEFORE_ON_PAPER, INK, NOISE_ON_PAPER, PALE, chip_colour, css
 
 __all__ = ["array_picture", "front_picture"]
 
@@ -27,7 +27,7 @@ def front_picture(path: str | Path, front: Front) -> None:
     """Draw the front: one dot per array, and the proven bounds of the figures."""
     figure = Figure(figsize=(7.2, 4.8), layout="constrained")
     axes = figure.subplots()
-    values = np.array([point.values for point in front.points])  # (p, 2)
+    values = front.values
     axes.plot(values[:, 0], values[:, 1], "o-", color=css(AFTER_ON_PAPER), lw=1.0, ms=5, label="best arrays found")
     stepped = {0, 1} - {i for i in (0, 1) if all(point.bounds[i] is not None for point in front.points)}
     for i in {0, 1} - stepped:
@@ -37,17 +37,15 @@ def front_picture(path: str | Path, front: Front) -> None:
             line = (values[:, 1 - i], bounds) if i == 1 else (bounds, values[:, 1 - i])
             axes.plot(*line, label="proven bound", **style)
         elif i == 1:
-            axes.axhline(bounds[0], label=f"proven bound of {front.names[i]}", **style)
+            axes.axhline(bounds[0], label=f"proven bound of {front.objectives[i].name}", **style)
         else:
-            axes.axvline(bounds[0], label=f"proven bound of {front.names[i]}", **{**style, "ls": ":"})
+            axes.axvline(bounds[0], label=f"proven bound of {front.objectives[i].name}", **{**style, "ls": ":"})
     for point in front.points:
         mark = point.array.name.removeprefix("front_")
         axes.annotate(mark, point.values, xytext=(5, 5), textcoords="offset points", fontsize=7, color=css(INK))
-    for name, meaning, unit, side in zip(
-        front.names, front.meanings, front.units, (axes.xaxis, axes.yaxis), strict=True
-    ):
-        side.set_label_text(f"{meaning}, {unit}" if unit else meaning)
-        if name == CHIPS:
+    for aim, side in zip(front.objectives, (axes.xaxis, axes.yaxis), strict=True):
+        side.set_label_text(f"{aim.meaning}, {aim.unit}" if aim.unit else aim.meaning)
+        if aim.name == CHIPS:
             side.set_major_locator(MaxNLocator(integer=True))
     axes.margins(0.08)
     axes.grid(lw=0.3)

@@ -11,7 +11,7 @@ import scipy.optimize
 from numpy.typing import NDArray
 
 from gfimu.array_search.criteria import Goal
-from gfimu.array_search.exchange import figure
+from gfimu.array_search.exchange import log_figure
 from gfimu.array_search.problem import Design, Problem, rows_of, slopes_by_design
 from gfimu.array_search.shapes import frames_across
 
@@ -125,7 +125,7 @@ def polish(problem: Problem, goal: Goal, design: Design) -> Design:
         if not np.isfinite(outcome.x).all():
             continue
         found = variables.design(np.clip(outcome.x, variables.bounds.lb, variables.bounds.ub))
-        better = weight > 0 or figure(problem, goal, found) <= figure(problem, goal, design)
+        better = weight > 0 or log_figure(problem, goal, found) <= log_figure(problem, goal, design)
         if better and feasible(problem, found):
             design = found
     return _freed_of_leakage(problem, design) if problem.non_recursive else design

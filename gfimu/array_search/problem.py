@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from gfimu.array.array import AccelerometerArray, Chip
 from gfimu.array_search.shapes import LATTICE, Shape, frames_across
-from gfimu.errors import GeometryError, InputError
-from gfimu.geometry.array import AccelerometerArray, Chip
+from gfimu.base.errors import GeometryError, InputError
 
 __all__ = ["Candidates", "Design", "Problem", "Sites", "Tolerance", "rows_of", "slopes_by_design"]
 

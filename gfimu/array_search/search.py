@@ -9,27 +9,30 @@ of them agree says how sure it is that nothing better exists, where the certific
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gfimu.array.array import AccelerometerArray, Chip
+from gfimu.array.array_file import ArrayFile
+from gfimu.array.dilution import gdop_lower_bound
+from gfimu.array.kinematics import require_all_motions
 from gfimu.array_search.certificate import Certificate, certify
 from gfimu.array_search.criteria import Goal
-from gfimu.array_search.exchange import exchange, figure
-from gfimu.array_search.objectives import Conditions, Objective, objective
+from gfimu.array_search.exchange import exchange, log_figure
+from gfimu.array_search.objectives import Conditions, Objective, Reached, objective
 from gfimu.array_search.polish import feasible, leaks, polish
 from gfimu.array_search.problem import Design, Problem
+from gfimu.array_search.scores import score_tables
+from gfimu.array_search.scoring import Score, score, score_panels
 from gfimu.array_search.shapes import box
-from gfimu.errors import GeometryError, InputError
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.geometry.dilution import gdop_lower_bound
-from gfimu.geometry.kinematics import require_all_motions
-from gfimu.geometry.scoring import Score, score, score_panels
-from gfimu.results import Panel, PlottedResult
-from gfimu.short_repr import short_repr
+from gfimu.base.declared import Declared, Table, cell, figure
+from gfimu.base.errors import GeometryError, InputError
+from gfimu.base.results import Panel, PlottedResult
+from gfimu.base.short_repr import short_repr
 
 __all__ = ["Found", "SearchResult", "best_design", "optimize", "search"]
 
@@ -47,29 +50,11 @@ _DIGITS = 6  # of positions in units, where rounding costs nothing
 
 
 @dataclass(frozen=True)
-class SearchResult(PlottedResult):
+class SearchResult(Declared, PlottedResult):
     """The best array of a search, with its score and its distance from a proven bound.
 
-    Parameters
-    ----------
-    array : AccelerometerArray
-        The array; ``array.to_toml()`` is an array file.
-    score : Score
-        Its figures of merit in its length unit, half the longest edge of the volume.
-    gdop_lower_bound : float
-        GDOP that no geometry of as many tri-axial chips in the cube around a box can beat; NaN for other searches.
-    starts : int
-        How many starts were made.
-    agreeing : int
-        How many of them ended at the best figure: trust the result less if it is one of many.
-    near : int
-        How many ended within 0.1 % of it.
-    objective : Objective
-        What was made small.
-    value : float
-        Its figure.
-    certificate : Certificate or None
-        A proven lower bound of it.
+    ``array.to_toml()`` is an array file; ``value`` is the figure of the ``objective``. Trust the result less if few of
+    the starts agree on it.
 
     Examples
     --------
@@ -79,15 +64,17 @@ class SearchResult(PlottedResult):
     1.0607, at least 1.0607
     """
 
-    array: AccelerometerArray
-    score: Score
-    gdop_lower_bound: float
-    starts: int
-    agreeing: int
-    near: int
+    array: Annotated[AccelerometerArray, figure("The array, as an array file holds it.", json=ArrayFile)]
+    score: Annotated[Score, figure("Its figures of merit.")]
+    gdop_lower_bound: Annotated[
+        float, figure("GDOP that no geometry of as many tri-axial chips can beat; null of other searches.")
+    ]
+    starts: Annotated[int, figure("Starts that were made.")]
+    agreeing: Annotated[int, figure("Starts that ended at the best figure.")]
+    near: Annotated[int, figure("Starts that ended within 0.1 % of it.", key="within_0_1_percent")]
     objective: Objective
     value: float
-    certificate: Certificate | None
+    certificate: Annotated[Certificate | None, figure("A proven lower bound; null where none is known.")]
 
     __repr__ = short_repr
 
@@ -111,23 +98,26 @@ class SearchResult(PlottedResult):
     def _panels(self) -> list[Panel]:
         return score_panels([self.score])
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the content of ``gfimu optimize --json``."""
-        return {
-            "array": self.array.to_dict(),
-            "score": self.score.to_dict(),
-            "gdop_lower_bound": self.gdop_lower_bound,
-            "starts": self.starts,
-            "agreeing": self.agreeing,
-            "within_0_1_percent": self.near,
-            "objective": {
-                "name": self.objective.name,
-                "meaning": self.objective.meaning,
-                "unit": self.objective.unit,
-                "value": self.value,
-            },
-            "certificate": None if self.certificate is None else self.certificate.to_dict(),
-        }
+    @property
+    def reached(
+        self,
+    ) -> Annotated[Reached, figure("What was made small.", key="objective", before="certificate")]:
+        """The objective with its figure."""
+        return Reached(self.objective.name, self.objective.meaning, self.objective.unit, self.value)
+
+    def shown(self) -> Iterator[Table | str]:
+        """Yield the places of the chips, the score, and how sure it is that nothing is better."""
+        yield Table(
+            f"{self.array.name}: positions in the body frame",
+            ("chip", "x m", "y m", "z m", "sensing axes"),
+            [(chip.name, *(f"{one:.5f}" for one in chip.position), _directions(chip)) for chip in self.array.chips],
+        )
+        yield from score_tables([self.score])
+        yield f"{self.objective.meaning}: {cell(self.value, '.5g')} {self.objective.unit}".rstrip()
+        near = f", {self.near} within 0.1 %" if self.near > self.agreeing else ""
+        yield f"{self.agreeing} of {self.starts} starts agree on it{near}"
+        none = "certificate: none; no lower bound is known for this objective and these chips"
+        yield none if self.certificate is None else self.certificate.text
 
 
 def optimize(
@@ -140,7 +130,7 @@ def optimize(
     non_recursive: bool = False,
     restarts: int = 40,
     part: str = "adxl345",
-    report: Callable[[int], None] | None = None,
+    report: Callable[[float], None] | None = None,
 ) -> SearchResult:
     """Search the array of least GDOP inside a box centred at the body origin.
 
@@ -163,7 +153,7 @@ def optimize(
     part : str
         Part of the chips in the result.
     report : callable, optional
-        Called with the number of starts done.
+        Called with the share of the starts that is done.
 
     Raises
     ------
@@ -185,7 +175,7 @@ def search(
     starts: int = 40,
     part: str = "adxl345",
     name: str = "",
-    report: Callable[[int], None] | None = None,
+    report: Callable[[float], None] | None = None,
 ) -> SearchResult:
     """Search the array for which an objective is least.
 
@@ -204,7 +194,7 @@ def search(
     name : str
         Name of the result.
     report : callable, optional
-        Called with the number of starts done.
+        Called with the share of the starts that is done.
 
     Raises
     ------
@@ -219,7 +209,7 @@ def search(
     condition = f"least {wanted.meaning} found" + (" with α free of ω²" if problem.non_recursive else "")
     description = f"{condition} for {n} chips of {k} axes in {problem.volume.name}"
     array = problem.array(found.design, name or f"optimized_{n}x{k}", part, description)
-    value = math.exp(figure(judged, wanted.goal, found.design))
+    value = math.exp(log_figure(judged, wanted.goal, found.design))
     figures = score(array)[0]
     if wanted.name.startswith("gdop_joint") and not math.isfinite(figures.gdop_joint):
         raise GeometryError(
@@ -268,7 +258,7 @@ def best_design(
     starts: int,
     kicks: int = _KICKS,
     also: tuple[Design, ...] = (),
-    report: Callable[[int], None] | None = None,
+    report: Callable[[float], None] | None = None,
 ) -> Found:
     """Return the best design of a number of starts.
 
@@ -291,7 +281,7 @@ def best_design(
         if feasible(problem, design) and not (problem.non_recursive and leaks(design)):
             (blind if _sees_too_little(design) else ends).append((value, design))
         if report is not None:
-            report(made)
+            report(made / (starts + len(also)))
         best = min((one for one, _ in ends), default=math.inf)
         if sum(one < best + goal.agreement for one, _ in ends) >= _ENOUGH:
             break
@@ -309,13 +299,13 @@ def _one_start(
     begin = problem.random_design(pool, rng) if given is None else given
     design, value = exchange(problem, goal, pool, begin, rng)
     design = polish(problem, goal, design)
-    value = figure(problem, goal, design)
+    value = log_figure(problem, goal, design)
     for _ in range(0 if problem.non_recursive else kicks):
         pool = problem.candidates(rng)
         trial, reached = exchange(problem, goal, pool, _kicked(problem, pool, design, rng), rng)
         if reached < value + _WORTH_A_POLISH:
             trial = polish(problem, goal, trial)
-            reached = figure(problem, goal, trial)
+            reached = log_figure(problem, goal, trial)
             if reached < value and feasible(problem, trial):
                 design, value = trial, reached
     return value, design
@@ -339,7 +329,7 @@ def _rounded(problem: Problem, goal: Goal, design: Design, value: float) -> Desi
     positions = np.round(design.positions, _DIGITS) + 0.0
     low, high = problem.shape.centre - problem.shape.half, problem.shape.centre + problem.shape.half
     tidy = Design(np.clip(positions, low, high), design.axes, design.site)
-    costs_nothing = figure(problem, goal, tidy) <= value + _ROUNDING_COST
+    costs_nothing = log_figure(problem, goal, tidy) <= value + _ROUNDING_COST
     clean = not (problem.non_recursive and leaks(tidy))
     return tidy if costs_nothing and clean and feasible(problem, tidy) else design
 
@@ -372,3 +362,10 @@ def _failure(problem: Problem, design: Design | None) -> GeometryError:
     return GeometryError(
         f"no geometry of {problem.n_chips} such chips in {where} was found that sees all motions well; use more chips"
     )
+
+
+def _directions(chip: Chip) -> str:
+    """Return the sensing axes in words: the turn of three changes no figure."""
+    if len(chip.axes) == 3:
+        return "any, e.g. body axes"
+    return "  ".join("(" + ", ".join(f"{value:.4f}" for value in axis) + ")" for axis in chip.axes)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull
 
-from gfimu.errors import InputError
+from gfimu.base.errors import InputError
 
 __all__ = ["LATTICE", "Shape", "box", "cylinder", "frames_across", "sphere"]
 

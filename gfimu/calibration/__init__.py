@@ -1,5 +1,6 @@
 """Calibration: one error model, one result class, one method per file.
 
-`methods` has one call for every name of `registry`. All return a `result.Calibration`, whose triads are those of
-`error_model`.
+In: recordings of poses, a rate table, a spin or any motion; an earlier calibration to update.
+Out: `Calibration` with its covariance, a certificate with its uncertainty budget (`certificate`), files of other
+programs (`exporting`). `registry` lists the methods; `methods` has one call for all.
 """

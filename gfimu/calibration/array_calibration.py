@@ -7,6 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import InputError
+from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.calibration.array_motion import ArrayMotion, array_motion
 from gfimu.calibration.array_shake import array_shake
 from gfimu.calibration.array_static import array_static
@@ -16,11 +19,8 @@ from gfimu.calibration.motion_reference import has_reference, motion_reference
 from gfimu.calibration.nonlinearity import quadratic_std
 from gfimu.calibration.observations import Observations, averaged_poses
 from gfimu.calibration.result import Calibration
-from gfimu.errors import InputError
-from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
 from gfimu.recording.rest import Rest, detect_rest
-from gfimu.units import STANDARD_GRAVITY
 
 __all__ = ["calibrate_array", "update_array_calibration"]
 

@@ -17,10 +17,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import UnitError
 from gfimu.calibration.motion_observability import describe_null_space
 from gfimu.calibration.motion_reference import MotionReference
-from gfimu.errors import UnitError
-from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
 
 __all__ = ["ArrayMotion", "array_motion", "gradient", "rate_derivative", "turning_readings"]

@@ -18,14 +18,14 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.linalg import block_diag
 
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import InputError
 from gfimu.calibration.array_motion import ArrayMotion, gradient, rate_derivative, turning_readings
 from gfimu.calibration.motion_observability import describe_null_space
 from gfimu.calibration.result import Calibration
 from gfimu.calibration.shake_equations import BorderedBand, RateSpline, Solved
 from gfimu.calibration.shake_scale import scale_from_band
 from gfimu.calibration.shake_start import Shake, shakes, signed_rate
-from gfimu.errors import InputError
-from gfimu.geometry.array import AccelerometerArray
 from gfimu.rate.sensing import SensorErrors
 from gfimu.recording import Recording
 from gfimu.recording.rest import Rest

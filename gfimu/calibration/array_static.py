@@ -15,6 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag, null_space
 
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import InputError
 from gfimu.calibration.coverage import check_magnitude_coverage, fit_sphere, pose_directions
 from gfimu.calibration.fit_quality import covariance_scale, odd_poses
 from gfimu.calibration.gauss_helmert import Condition, gauss_helmert
@@ -22,8 +24,6 @@ from gfimu.calibration.nonlinearity import quadratic_statement, with_quadratic
 from gfimu.calibration.observations import Observations
 from gfimu.calibration.parameter_names import parameter_names, quadratic_names
 from gfimu.calibration.result import Calibration
-from gfimu.errors import InputError
-from gfimu.geometry.array import AccelerometerArray
 
 __all__ = [
     "apparent_alpha",

@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import InputError, UnitError
 from gfimu.calibration.array_static import (
     apparent_alpha,
     bias_places,
@@ -25,8 +27,6 @@ from gfimu.calibration.array_static import (
 from gfimu.calibration.nonlinearity import with_quadratic
 from gfimu.calibration.observations import Observations
 from gfimu.calibration.result import Calibration
-from gfimu.errors import InputError, UnitError
-from gfimu.geometry.array import AccelerometerArray
 
 __all__ = ["array_update"]
 

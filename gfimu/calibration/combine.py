@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from gfimu.base.errors import InputError
 from gfimu.calibration.result import Calibration
-from gfimu.errors import InputError
 
 __all__ = ["combine"]
 

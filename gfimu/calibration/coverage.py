@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.errors import InputError
+from gfimu.base.errors import InputError
 
 __all__ = [
     "FACES",

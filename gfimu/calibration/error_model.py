@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gfimu.errors import InputError, unknown_name
+from gfimu.base.errors import InputError, unknown_name
 
 __all__ = ["GAUGES", "ErrorModel", "free_elements"]
 

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.base.errors import InputError
 from gfimu.calibration.coverage import distinct_poses, pose_directions, pose_label
 from gfimu.calibration.result import Calibration
-from gfimu.errors import InputError
 from gfimu.recording import Recording
 from gfimu.recording.rest import Rest
 

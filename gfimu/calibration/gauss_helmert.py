@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gfimu.errors import InputError
+from gfimu.base.errors import InputError
 
 __all__ = ["Adjustment", "Condition", "gauss_helmert"]
 
@@ -114,18 +114,27 @@ def gauss_helmert(
     span = None if basis is None else np.asarray(basis, dtype=float)
     prior = _prior_rows(prior_std, len(x))  # (m, u)
     v: Floats | None = None
+    from_x, from_v = x, v  # where the last step began
     for iteration in range(1, max_iterations + 1):
-        f, a, b = condition(x, raw if v is None else raw + v)  # (n, r), (n, r, u), (n, r, d)
-        w = f if v is None else f - np.einsum("nrd,nd->nr", b, v)
-        bq = _times_covariance(b, q)  # (n, r, d)
-        root = _whitening(bq, b)  # (B Q Bᵀ)⁻¹ = Lᵀ L, (n, r, r)
-        design = np.concatenate([_whitened(root, a).reshape(-1, len(x)), prior])
-        if span is not None:
-            design = design @ span
-        closure = np.concatenate([_whitened(root, w[..., None]).ravel(), prior @ x])
-        step, cofactor, null = _solve(design, closure, minimum_norm)
+        try:
+            with np.errstate(all="ignore"):
+                f, a, b = condition(x, raw if v is None else raw + v)  # (n, r), (n, r, u), (n, r, d)
+                w = f if v is None else f - np.einsum("nrd,nd->nr", b, v)
+                bq = _times_covariance(b, q)  # (n, r, d)
+                root = _whitening(bq, b)  # (B Q Bᵀ)⁻¹ = Lᵀ L, (n, r, r)
+                design = np.concatenate([_whitened(root, a).reshape(-1, len(x)), prior])
+                if span is not None:
+                    design = design @ span
+                closure = np.concatenate([_whitened(root, w[..., None]).ravel(), prior @ x])
+                step, cofactor, null = _solve(design, closure, minimum_norm)
+        except np.linalg.LinAlgError:  # the step led to where the conditions have no solution: half of it
+            if x is from_x or not np.isfinite(x).all():
+                break
+            x, v = 0.5 * (from_x + x), v if v is None or from_v is None else 0.5 * (from_v + v)
+            continue
+        from_x, from_v = x, v
         dx = step if span is None else span @ step
-        x += dx
+        x = x + dx
         full = cofactor if span is None else span @ cofactor @ span.T
         std = np.sqrt(np.diag(full))
         settled = bool(np.all(np.abs(dx) <= np.maximum(tolerance * std, 1e-14 * np.abs(x))))
@@ -133,15 +142,11 @@ def gauss_helmert(
         if move_observations or last:
             rest = _whitened(root, (w + a @ dx)[..., None])  # whitened A dx + w, (n, r, 1)
             new_v = -np.einsum("nrd,nr->nd", bq, _whitened(root.swapaxes(1, 2), rest)[..., 0])
-            if not np.isfinite(new_v).all():
-                break
             if move_observations:
                 noise = np.sqrt(np.einsum("...dd->...d", q))
                 moved = np.abs(new_v if v is None else new_v - v)
                 last = settled and bool(np.all(moved <= 1e3 * tolerance * noise))
                 v = new_v
-        if not np.isfinite(x).all():
-            break
         if last:
             redundancy = len(closure) - (design.shape[-1] - null.shape[1])
             square = float(np.sum(rest**2)) + float(np.sum((prior @ x) ** 2))
@@ -183,6 +188,8 @@ def _whitened(root: Floats, matrix: Floats) -> Floats:
 
 def _solve(design: Floats, closure: Floats, minimum_norm: bool) -> tuple[Floats, Floats, Floats]:
     """Least-squares step −(design)⁺ closure, its cofactor matrix and the undetermined directions."""
+    if not (np.isfinite(design).all() and np.isfinite(closure).all()):
+        raise np.linalg.LinAlgError("the conditions are not finite")
     u = design.shape[1]
     scale = np.linalg.norm(design, axis=0)
     scale[scale == 0.0] = 1.0

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from gfimu.errors import InputError
-from gfimu.files.input_file import read_bytes
+from gfimu.base.errors import InputError
+from gfimu.base.files.input_file import as_path, read_bytes
 from gfimu.recording import Recording
 
 __all__ = ["read_text_triad"]
@@ -37,7 +37,7 @@ def read_text_triad(path: str | Path, *, channels: tuple[str, str, str] = ("a11"
     InputError
         If the file is missing or not four columns of numbers, or its time does not increase.
     """
-    file = Path(path)
+    file = as_path(path)
     content = read_bytes(file)
     try:
         with warnings.catch_warnings():

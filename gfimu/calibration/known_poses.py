@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gfimu.base.errors import InputError
 from gfimu.calibration.coverage import FACES, check_faces, pose_directions
 from gfimu.calibration.error_model import ErrorModel
 from gfimu.calibration.observations import Observations
-from gfimu.errors import InputError
 
 __all__ = ["face_poses", "forward_design", "levelling_covariance"]
 

@@ -8,6 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from gfimu.array.array import AccelerometerArray
+from gfimu.array.parts.part import Part
+from gfimu.base.errors import InputError, naming
+from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.calibration.array_calibration import update_array_calibration
 from gfimu.calibration.combine import combine
 from gfimu.calibration.faults import (
@@ -18,23 +22,19 @@ from gfimu.calibration.faults import (
     without_moved_poses,
 )
 from gfimu.calibration.fit_quality import mean_factor
+from gfimu.calibration.given import RateTable
 from gfimu.calibration.nonlinearity import quadratic_std
 from gfimu.calibration.observations import Observations, observations_from
 from gfimu.calibration.rate_table import body_axis, find_plateaus
 from gfimu.calibration.registry import METHODS, CalibrationMethod, calibration_method
 from gfimu.calibration.result import Calibration
 from gfimu.calibration.spin.policy import SpinPolicy
-from gfimu.errors import InputError, naming
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.parts.part import Part
 from gfimu.recording import Recording
 from gfimu.recording.rest import detect_rest
-from gfimu.units import STANDARD_GRAVITY
 
 __all__ = [
     "METHODS",
     "CalibrationTask",
-    "RateTable",
     "calibrate",
     "calibrate_by_spin",
     "calibrate_gyro",
@@ -45,26 +45,6 @@ __all__ = [
     "run_calibration",
     "temperature_statistics",
 ]
-
-
-@dataclass(frozen=True)
-class RateTable:
-    """Recordings of a gyro on a rate table besides the first one.
-
-    Parameters
-    ----------
-    also : tuple of Recording
-        Recordings of the gyro mounted otherwise.
-    axes : tuple of str
-        Axis of the gyro along the table's, up, of the first recording and each of those: x, -y …; by default those of
-        their mountings.
-    names : tuple of str
-        Names of these recordings, for messages.
-    """
-
-    also: tuple[Recording, ...] = ()
-    axes: tuple[str, ...] = ()
-    names: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -152,7 +132,7 @@ def calibrate(
     recording : Recording
         Readings of one or more chips, in m/s² or raw counts.
     gravity : float
-        Local gravity, m/s²; see `gfimu.geometry.gravity.local_gravity`.
+        Local gravity, m/s²; see `gfimu.array.gravity.local_gravity`.
     n_parameters : {9, 12}, optional
         Parameters per triad; 12 by default, 9 for ``multi-position``.
     input_kind : {"averaged", "raw", "wavelet"}

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import savgol_coeffs, savgol_filter
 
-from gfimu.errors import InputError
-from gfimu.importing.guessing.likely_reference import reference_remedy
+from gfimu.base.errors import InputError
 from gfimu.recording import Recording
+from gfimu.recording.importing.guessing.likely_reference import reference_remedy
 from gfimu.recording.rest import detect_rest
 from gfimu.recording.timing.reference_times import reference_on_rows
 

@@ -11,6 +11,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.array.gravity import EARTH_RATE
+from gfimu.base.errors import unknown_name
 from gfimu.calibration.coverage import check_magnitude_coverage, fit_sphere, pose_directions
 from gfimu.calibration.error_model import ErrorModel, free_elements
 from gfimu.calibration.fit_quality import covariance_scale
@@ -19,8 +21,6 @@ from gfimu.calibration.nonlinearity import quadratic_statement, with_quadratic
 from gfimu.calibration.observations import Observations
 from gfimu.calibration.parameter_names import parameter_names, quadratic_names
 from gfimu.calibration.result import Calibration
-from gfimu.errors import unknown_name
-from gfimu.geometry.gravity import EARTH_RATE
 
 __all__ = [
     "WEIGHTINGS",

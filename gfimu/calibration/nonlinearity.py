@@ -13,11 +13,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gfimu.array.array import AccelerometerArray
+from gfimu.array.parts.part_file import PartFile
+from gfimu.base.errors import InputError
 from gfimu.calibration.gauss_helmert import Condition
 from gfimu.calibration.observations import Observations
-from gfimu.errors import InputError
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.parts.part_file import PartFile
 from gfimu.recording import Recording
 
 __all__ = ["cubic_std", "quadratic_statement", "quadratic_std", "with_quadratic", "without_quadratic"]

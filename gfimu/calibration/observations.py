@@ -15,7 +15,7 @@ import numpy as np
 import pywt
 from numpy.typing import ArrayLike, NDArray
 
-from gfimu.errors import InputError, unknown_name
+from gfimu.base.errors import InputError, unknown_name
 from gfimu.recording import Recording
 from gfimu.recording.rest import Rest, mean_variance_factor
 

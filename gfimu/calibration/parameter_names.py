@@ -2,24 +2,42 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 
+from gfimu.base.errors import InputError
 from gfimu.calibration.error_model import free_elements
 
-__all__ = ["KINDS", "cubic_names", "parameter_names", "quadratic_names"]
+__all__ = ["KINDS", "cubic_names", "kind_of", "parameter_names", "quadratic_names"]
 
 _AXES = "xyz"
 
-KINDS: Mapping[str, Callable[[list[str]], bool]] = {
-    "sensitivity": lambda parts: parts[1] == "M" and parts[2][0] == parts[2][1],
-    "cross-axis sensitivity": lambda parts: parts[1] == "M" and parts[2][0] != parts[2][1],
-    "bias": lambda parts: parts[1] == "b",
-    "position": lambda parts: parts[1] == "r",
-    "quadratic coefficient": lambda parts: parts[1] == "q",
-    "cubic coefficient": lambda parts: parts[1] == "c",
-    "delay": lambda parts: parts[1] == "d",
+_NAME = re.compile("(?s:.+)_(?:(M)_[xyz]{2}|([brqc])_[xyz]|(d))")
+
+KINDS: Mapping[str, Callable[[str], bool]] = {
+    "sensitivity": lambda name: kind_of(name) == "M" and name[-2] == name[-1],
+    "cross-axis sensitivity": lambda name: kind_of(name) == "M" and name[-2] != name[-1],
+    "bias": lambda name: kind_of(name) == "b",
+    "position": lambda name: kind_of(name) == "r",
+    "quadratic coefficient": lambda name: kind_of(name) == "q",
+    "cubic coefficient": lambda name: kind_of(name) == "c",
+    "delay": lambda name: kind_of(name) == "d",
 }
-"""Kinds of parameters by the parts of their names, each a panel of the picture."""
+"""Kinds of parameters by their names, each a panel of the picture."""
+
+
+def kind_of(name: str) -> str:
+    """Return the letter of a parameter's kind: M, b, r, q, c or d.
+
+    Raises
+    ------
+    InputError
+        If it is no name of a parameter.
+    """
+    found = _NAME.fullmatch(name)
+    if found is None:
+        raise InputError(f"{name!r:.60} is no parameter of a calibration; its names are such as a1_M_xy and a1_b_x")
+    return str(found[found.lastindex or 0])
 
 
 def parameter_names(chip: str, gauge: str) -> tuple[str, ...]:

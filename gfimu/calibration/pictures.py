@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.base.files.atomic_file import atomic_path
+from gfimu.base.results.colours import AFTER_ON_PAPER, BEFORE_ON_PAPER, DIVERGING, INK, chip_colour, css
 from gfimu.calibration.check_poses import rest_means
 from gfimu.calibration.result import Calibration
-from gfimu.files.atomic_file import atomic_path
 from gfimu.recording import Recording
 from gfimu.recording.rest import Rest, detect_rest
-from gfimu.visual.colours import AFTER_ON_PAPER, BEFORE_ON_PAPER, DIVERGING, INK, chip_colour, css
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

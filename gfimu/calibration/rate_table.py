@@ -18,20 +18,20 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from gfimu.array.gravity import EARTH_RATE
+from gfimu.array.integration import integrate_samples
+from gfimu.base.errors import InputError
+from gfimu.base.units import GYRO_COLUMNS
 from gfimu.calibration.error_model import free_elements
 from gfimu.calibration.fit_quality import covariance_scale
 from gfimu.calibration.known_poses import forward_design
 from gfimu.calibration.observations import regular_covariance
 from gfimu.calibration.parameter_names import parameter_names
 from gfimu.calibration.result import Calibration
-from gfimu.errors import InputError
-from gfimu.geometry.gravity import EARTH_RATE
-from gfimu.importing.guessing.likely_reference import reference_remedy
-from gfimu.rate.integration import integrate_samples
 from gfimu.recording import Recording
+from gfimu.recording.importing.guessing.likely_reference import reference_remedy
 from gfimu.recording.rest import detect_rest, mean_variance_factor
 from gfimu.recording.timing.reference_times import reference_on_rows
-from gfimu.units import GYRO_COLUMNS
 
 __all__ = ["Plateaus", "body_axis", "find_plateaus", "rate_table_gyro"]
 

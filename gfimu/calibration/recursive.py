@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import block_diag
 
+from gfimu.base.errors import InputError
 from gfimu.calibration.coverage import fit_sphere
 from gfimu.calibration.error_model import ErrorModel, free_elements
 from gfimu.calibration.fit_quality import covariance_scale
@@ -21,7 +22,6 @@ from gfimu.calibration.nonlinearity import quadratic_statement
 from gfimu.calibration.observations import Observations
 from gfimu.calibration.parameter_names import parameter_names, quadratic_names
 from gfimu.calibration.result import Calibration
-from gfimu.errors import InputError
 
 __all__ = ["RecursiveCalibrator", "recursive"]
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
-from gfimu.errors import unknown_name
+from gfimu.base.errors import unknown_name
 
 __all__ = ["METHODS", "CalibrationMethod", "calibration_method"]
 

@@ -9,69 +9,64 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.declared import Declared, Matrix, Table, cell, figure, plain, table
+from gfimu.base.errors import InputError, UnitError
+from gfimu.base.files.atomic_file import write_text
+from gfimu.base.files.input_file import LARGEST_TEXT, check_input
+from gfimu.base.results import Panel, PlottedResult, Series
+from gfimu.base.short_repr import joined
+from gfimu.base.units import LARGEST
 from gfimu.calibration.error_model import GAUGES, ErrorModel
-from gfimu.calibration.parameter_names import KINDS, cubic_names, parameter_names, quadratic_names
+from gfimu.calibration.parameter_names import KINDS, cubic_names, kind_of, parameter_names, quadratic_names
 from gfimu.calibration.valid_covariance import require_covariance, require_finite
-from gfimu.errors import InputError, UnitError
-from gfimu.files.atomic_file import write_text
-from gfimu.files.input_file import check_input
-from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
-from gfimu.results import Panel, PlottedResult, Series
-from gfimu.short_repr import joined
 
-__all__ = ["FORMAT_VERSION", "Calibration", "load_calibration"]
+__all__ = ["FORMAT_VERSION", "Calibration", "CalibrationParameter", "load_calibration"]
 
 FORMAT = "gfimu-calibration"
 FORMAT_VERSION = 1
 
+Floats = NDArray[np.float64]
+
 _AXES = "xyz"
+_PAIRS = ("xy", "xz", "yz")
+_NOTABLE = 0.9  # correlation of two misalignments
+TURN_ON_STD_M_S2 = 0.01
+"""Change of a bias from one power-on to the next, m/s²: twice the 4.5 mm/s² between two sessions of a MIMU4444."""
 _READING_UNITS = {"lsb": ("lsb", "m_s2"), "m_s2": ("m_s2", "m_s2"), "rad_s": ("rad_s", "rad_s")}
 """Reading unit to (name of the reading unit, unit of the true input)."""
 
 
 @dataclass(frozen=True)
-class Calibration(PlottedResult):
-    """Parameters of a calibrated triad or array, with their uncertainty.
+class CalibrationParameter(Declared):
+    """A parameter of a calibration."""
 
-    Parameters
-    ----------
-    method : str
-        Method that made it.
-    unit : {"lsb", "m_s2", "rad_s"}
-        Unit of the readings it applies to; true inputs are in m/s² (rad/s for a gyro).
-    channels : tuple of str
-        Channels it applies to, three per chip, in order.
-    gauge : str
-        Which frame the true inputs are expressed in: a key of `gfimu.calibration.error_model.GAUGES`.
-    gravity : float
-        Magnitude of the true input used, m/s² (rad/s for a gyro).
-    names : tuple of str
-        Parameter names: ``a1_M_xy`` (sensitivity, reading unit per m/s²), ``a1_b_x`` (bias, reading unit),
-        ``a1_q_x`` (quadratic coefficient, 1 per reading unit), ``a1_c_x`` (cubic coefficient, 1 per reading unit
-        squared), ``a1_r_x`` (position, m),
-        ``a1_d`` (delay of the chip against the mean of all, s; not applied).
-    values : ndarray, shape (p,)
-        Parameter values.
-    covariance : ndarray, shape (p, p)
-        Covariance of the values.
-    null_space : ndarray, shape (p, k)
-        Orthonormal parameter directions that the data did not determine; their values come from the gauge.
-    statements : tuple of str
-        What was not determined, and other statements a reader needs.
-    warnings : tuple of str
-        What looked wrong in the data.
-    statistics : mapping of str to float or str
-        Residual RMS, number of poses, redundancy, variance factor, rest threshold and so on; units in the keys.
+    name: Annotated[str, figure("Chip or channel, and the parameter.", head="parameter")]
+    value: Annotated[float, figure("Its value.", head="value", form=".7g")]
+    std: Annotated[float, figure("Its standard deviation.", head="std", form=".2g")]
+    unit: Annotated[str, figure("Unit of both.", head="unit")]
+
+
+@dataclass(frozen=True)
+class Calibration(Declared, PlottedResult):
+    """A calibration; the file holds the same keys but files.
+
+    ``names`` (p,) are those of the parameters ``values`` (p,): ``a1_M_xy`` (sensitivity, reading unit per m/s²),
+    ``a1_b_x`` (bias, reading unit), ``a1_q_x`` (quadratic coefficient, 1 per reading unit), ``a1_c_x`` (cubic
+    coefficient, 1 per reading unit squared), ``a1_r_x`` (position, m), ``a1_d`` (delay of the chip against the mean of
+    all, s; not applied). ``gravity`` is the magnitude of the true input used, m/s² (rad/s for a gyro). ``null_space``
+    (p, k) holds orthonormal directions that the data did not determine; their values come from the gauge.
 
     Examples
     --------
@@ -83,19 +78,56 @@ class Calibration(PlottedResult):
     -0.371 ± 0.001 m/s²
     """
 
-    method: str
-    unit: str
-    channels: tuple[str, ...]
-    gauge: str
+    method: Annotated[str, figure("Method that made it.")]
+    unit: Annotated[str, figure("Unit of the readings that it applies to; true inputs are in m/s² (rad/s of a gyro).")]
+    channels: Annotated[tuple[str, ...], figure("Channels that it applies to, three per chip, in order.")]
+    gauge: Annotated[str, figure("Frame in which the true inputs are expressed.")]
     gravity: float
     names: tuple[str, ...]
-    values: NDArray[np.float64]
-    covariance: NDArray[np.float64]
-    null_space: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 0)))
-    statements: tuple[str, ...] = ()
-    warnings: tuple[str, ...] = ()
-    statistics: Mapping[str, float | str] = field(default_factory=dict)
-    format_version: int = FORMAT_VERSION
+    values: Floats
+    covariance: Annotated[Floats, figure("Covariance of the parameters, in products of their units.", json=Matrix)]
+    null_space: Floats = field(default_factory=lambda: np.empty((0, 0)))
+    statements: Annotated[tuple[str, ...], figure("What was not determined, and further statements.")] = ()
+    warnings: Annotated[tuple[str, ...], figure("What looked wrong in the data.")] = ()
+    statistics: Annotated[
+        Mapping[str, float | str],
+        figure(
+            "Residuals, number of poses, redundancy, variance factor and so on; units in the keys.", json=dict[str, Any]
+        ),
+    ] = field(default_factory=dict)
+    format_version: Annotated[int, figure("Version of the format.", before="method")] = FORMAT_VERSION
+
+    @property
+    def format(self) -> Annotated[str, figure("gfimu-calibration.", before="format_version")]:
+        """Name of the file's format."""
+        return FORMAT
+
+    @property
+    def gauge_meaning(self) -> Annotated[str, figure("That frame in words.", before="covariance")]:
+        """Frame in which the true inputs are expressed, in words."""
+        return GAUGES[self.gauge]
+
+    @property
+    def gravity_m_s2(
+        self,
+    ) -> Annotated[float | None, figure("Magnitude of the true input.", "m/s²", absent=True, before="covariance")]:
+        """Gravity used, m/s²; None for a gyro."""
+        return None if self.unit == "rad_s" else self.gravity
+
+    @property
+    def earth_rate_rad_s(
+        self,
+    ) -> Annotated[
+        float | None, figure("Of a gyro: magnitude of the true input.", "rad/s", absent=True, before="covariance")
+    ]:
+        """Rate of the Earth used for a gyro, rad/s; None for accelerometers."""
+        return self.gravity if self.unit == "rad_s" else None
+
+    @property
+    def parameters(self) -> Annotated[list[CalibrationParameter], figure("The parameters.", before="covariance")]:
+        """The parameters, each with its standard deviation and unit."""
+        rows = zip(self.names, self.values.tolist(), self.std.tolist(), self.units, strict=True)
+        return [CalibrationParameter(*row) for row in rows]
 
     def __post_init__(self) -> None:
         if self.unit not in _READING_UNITS:
@@ -105,6 +137,10 @@ class Calibration(PlottedResult):
             raise InputError(f"a calibration of {count} parameters needs that many values and their covariance matrix")
         if len(self.channels) % 3 or not self.channels:
             raise InputError("a calibration needs three channels per chip")
+        for name in self.names:
+            kind_of(name)
+        if abs(self.gravity) > LARGEST:  # NaN where the method needs none
+            raise InputError(f"a true input of {self.gravity:g} can't be; it is at most {LARGEST:g}")
         require_finite(self.names, self.values)
         require_covariance(self.names, self.covariance)
         if self.null_space.size == 0:
@@ -149,7 +185,7 @@ class Calibration(PlottedResult):
         """One panel per kind of parameter, what it deviates from an ideal triad where that is 1 or 0."""
         panels = []
         for title, belongs in KINDS.items():
-            places = [place for place, name in enumerate(self.names) if belongs(name.split("_"))]
+            places = [place for place, name in enumerate(self.names) if belongs(name)]
             if not places:
                 continue
             ideal = 1.0 if title == "sensitivity" and self.unit != "lsb" else 0.0
@@ -165,7 +201,9 @@ class Calibration(PlottedResult):
         return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
 
     @property
-    def correlation(self) -> NDArray[np.float64]:
+    def correlation(
+        self,
+    ) -> Annotated[Floats, figure("Correlation of the parameters.", json=Matrix, before="statements")]:
         """Correlation matrix of the parameters, shape (p, p); zero rows for parameters without variance."""
         std = self.std
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -181,7 +219,7 @@ class Calibration(PlottedResult):
         ratio = "1" if reading == true else f"{reading} per {true}"
         inverse, square = {"m_s2": ("s²/m", "s⁴/m²")}.get(reading, (f"1 per {reading}", f"1 per {reading}²"))
         units = {"M": ratio, "b": reading, "r": "m", "q": inverse, "c": square, "d": "s"}
-        return tuple(units[name.split("_")[1]] for name in self.names)
+        return tuple(units[kind_of(name)] for name in self.names)
 
     @property
     def chips(self) -> tuple[str, ...]:
@@ -214,6 +252,17 @@ class Calibration(PlottedResult):
             for chip in self.chips
             if f"{chip}_r_x" in self.names
         }
+
+    @property
+    def bias_std(self) -> dict[str, float]:
+        """Standard deviation of what the correction leaves of each channel's bias in a later session, m/s²."""
+        stds = {}
+        for chip, model in self.models.items():
+            places = [self._index(f"{chip}_b_{axis}") for axis in _AXES]
+            spread = model.inverse @ self.covariance[np.ix_(places, places)] @ model.inverse.T
+            for number, variance in enumerate(np.diag(spread), 1):
+                stds[f"{chip}{number}"] = math.hypot(math.sqrt(max(float(variance), 0.0)), TURN_ON_STD_M_S2)
+        return stds
 
     def value(self, name: str) -> float:
         """Value of a parameter by name; raises `InputError` that lists the names."""
@@ -290,6 +339,9 @@ class Calibration(PlottedResult):
             columns = [recording.channels.index(f"{chip}{axis}") for axis in (1, 2, 3)]
             readings[:, columns] = (model.read if forward else model.correct)(readings[:, columns])
         metadata = dict(recording.metadata) | {"calibration": self.method if not forward else "inverted"}
+        metadata.pop("bias_std_m_s2", None)
+        if not forward:
+            metadata["bias_std_m_s2"] = self.bias_std
         if target == "m_s2":
             metadata.pop("lsb_m_s2", None)
         return replace(recording, readings=readings, unit=target, metadata=metadata)
@@ -300,42 +352,41 @@ class Calibration(PlottedResult):
         positions = [fitted.get(chip.name, chip.position) for chip in array.chips]
         return array.with_geometry(positions, [chip.axes for chip in array.chips])
 
-    def rows(self) -> list[tuple[str, str, str, str]]:
-        """Rows of a table for people: name, value, standard deviation, unit."""
-        return [
-            (name, f"{value:.3g}" if name.split("_")[1] in "qc" else f"{value:.6f}", f"{std:.2g}", unit)
-            for name, value, std, unit in zip(self.names, self.values, self.std, self.units, strict=True)
-        ]
+    @property
+    def undetermined(
+        self,
+    ) -> Annotated[
+        Floats,
+        figure(
+            "Orthonormal directions of the parameters that the data did not determine.",
+            key="null_space", json=Matrix, before="statements",
+        ),
+    ]:  # fmt: skip
+        """Directions of the parameters that the data did not determine, one a row, shape (k, p)."""
+        return self.null_space.T
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the content of the calibration file."""
-        return {
-            "format": FORMAT,
-            "format_version": self.format_version,
-            "method": self.method,
-            "unit": self.unit,
-            "channels": list(self.channels),
-            "gauge": self.gauge,
-            "gauge_meaning": GAUGES[self.gauge],
-            "gravity_m_s2" if self.unit != "rad_s" else "earth_rate_rad_s": self.gravity,
-            "parameters": [
-                {"name": name, "value": float(value), "std": float(std), "unit": unit}
-                for name, value, std, unit in zip(self.names, self.values, self.std, self.units, strict=True)
-            ],
-            "covariance": self.covariance.tolist(),
-            "correlation": self.correlation.tolist(),
-            "null_space": self.null_space.T.tolist(),
-            "statements": list(self.statements),
-            "warnings": list(self.warnings),
-            "statistics": {
-                key: None if isinstance(value, float) and not math.isfinite(value) else value
-                for key, value in self.statistics.items()
-            },
-        }
+    def shown(self) -> Iterator[Table | str]:
+        """Yield the tables and sentences that people read."""
+        yield table(f"{self.method} calibration, unit {self.unit}", self.parameters, "name value std unit")
+        # Correlation is news where magnitudes alone leave a rotation open, and only there.
+        pairs = [
+            (f"{chip} {pair.upper()} / {pair[::-1].upper()}", f"{self.correlation_of(first, second):+.4f}")
+            for chip in self.chips
+            for pair in _PAIRS
+            if (first := f"{chip}_M_{pair}") in self.names
+            and (second := f"{chip}_M_{pair[::-1]}") in self.names
+            and abs(self.correlation_of(first, second)) > _NOTABLE
+        ]
+        if pairs:
+            yield Table("correlation of the misalignments", ("pair", "correlation"), pairs)
+        rows = [(key, cell(value, ".6g")) for key, value in self.statistics.items()]
+        yield Table("fit", ("quantity", "value"), rows)
+        yield from (f"note: {text}" for text in self.statements)
+        yield from (f"warning: {text}" for text in self.warnings)
 
     def save(self, path: str | Path) -> None:
         """Write the calibration as JSON, whole or not at all."""
-        write_text(path, json.dumps(self.to_dict(), indent=1, allow_nan=False) + "\n")
+        write_text(path, json.dumps(plain(self.to_dict()), indent=1, allow_nan=False) + "\n")
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], *, source: str = "calibration") -> Calibration:
@@ -354,6 +405,7 @@ class Calibration(PlottedResult):
                 "calibrate again"
             )
         try:
+            msgspec.convert(data, _CalibrationFile)
             parameters = data["parameters"]
             magnitude = data["earth_rate_rad_s"] if data["unit"] == "rad_s" else data["gravity_m_s2"]
             null_space = np.array(data.get("null_space", []), dtype=float)
@@ -379,6 +431,25 @@ class Calibration(PlottedResult):
         return calibration
 
 
+class _Entry(msgspec.Struct):
+    name: str
+    value: float
+
+
+class _CalibrationFile(msgspec.Struct):
+    """Types of the keys of a file that are read."""
+
+    channels: list[str]
+    parameters: list[_Entry]
+    covariance: list[list[float]]
+    null_space: list[list[float]] = []
+    gravity_m_s2: float = 0.0
+    earth_rate_rad_s: float = 0.0
+    statements: list[str] = []
+    warnings: list[str] = []
+    statistics: dict[str, float | str | None] = {}
+
+
 def load_calibration(path: str | Path) -> Calibration:
     """Read a calibration from its JSON file.
 
@@ -392,7 +463,7 @@ def load_calibration(path: str | Path) -> Calibration:
     >>> import gfimu
     >>> gfimu.load_calibration("cal.json").apply(run)  # doctest: +SKIP
     """
-    file = check_input(path)
+    file = check_input(path, largest=LARGEST_TEXT)
     try:
         data = json.loads(file.read_text(encoding="utf-8"))
     except OSError as error:

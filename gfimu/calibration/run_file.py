@@ -7,13 +7,13 @@ from typing import cast
 
 import numpy as np
 
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import InputError
+from gfimu.base.files.column_file import open_columns
+from gfimu.base.files.input_file import is_ordinary
+from gfimu.base.files.table import ArrowStream
 from gfimu.calibration.imu_tk import read_text_triad
 from gfimu.calibration.result import Calibration
-from gfimu.errors import InputError
-from gfimu.files.column_file import open_columns
-from gfimu.files.input_file import is_ordinary
-from gfimu.files.table import ArrowStream
-from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
 from gfimu.recording.carried_array import array_difference
 from gfimu.recording.formats import format_of_recording, open_run

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import InputError
 from gfimu.calibration.array_motion import turning_readings
-from gfimu.errors import InputError
-from gfimu.geometry.array import AccelerometerArray
 from gfimu.rate.maximum_likelihood import maximum_likelihood_rate
 from gfimu.rate.sensing import SensorErrors
 from gfimu.recording import Recording

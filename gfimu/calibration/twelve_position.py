@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.base.errors import InputError
 from gfimu.calibration.coverage import check_magnitude_coverage, pose_directions
 from gfimu.calibration.error_model import ErrorModel, free_elements
 from gfimu.calibration.fit_quality import covariance_scale
@@ -26,7 +27,6 @@ from gfimu.calibration.multi_position import (
 from gfimu.calibration.nonlinearity import quadratic_statement, with_quadratic
 from gfimu.calibration.observations import Observations
 from gfimu.calibration.result import Calibration
-from gfimu.errors import InputError
 
 __all__ = ["coarse_solution", "rotation_directions", "twelve_position"]
 

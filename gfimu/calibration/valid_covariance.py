@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.errors import InputError
+from gfimu.base.errors import InputError
+from gfimu.base.units import LARGEST
 
 __all__ = ["require_covariance", "require_finite"]
 
@@ -14,8 +15,8 @@ _ROUNDING = 1e-6
 
 
 def require_finite(names: tuple[str, ...], values: NDArray[np.float64]) -> None:
-    """Refuse values that hold NaN or infinity; the message names the first parameter."""
-    bad = np.flatnonzero(~np.isfinite(values))
+    """Refuse values that are NaN or beyond what can be computed with; the message names the first parameter."""
+    bad = np.flatnonzero(~(np.abs(values) <= LARGEST))
     if bad.size:
         raise InputError(f"parameter {names[bad[0]]} is {values[bad[0]]}; calibrate again, with more poses")
 
@@ -26,7 +27,7 @@ def require_covariance(names: tuple[str, ...], covariance: NDArray[np.float64]) 
     All three are judged on the correlations, because the parameters have different units and sizes.
     """
     remedy = "calibrate again, with more poses"
-    row, column = (int(place[0]) if len(place) else -1 for place in np.nonzero(~np.isfinite(covariance)))
+    row, column = (int(place[0]) if len(place) else -1 for place in np.nonzero(~(np.abs(covariance) <= LARGEST**2)))
     if row >= 0:
         raise InputError(f"the covariance of {names[row]} and {names[column]} is {covariance[row, column]}; {remedy}")
     variance = np.diag(covariance)

@@ -1,5 +1,5 @@
-"""A function under each command: paths or objects in, the result object out, files where an ``out`` is named.
+"""The commands: a function under each, with its options, its result and its words on the shell.
 
-These stand above all other packages, like `gfimu.cli`, and are reached as ``gfimu.simulate``, ``gfimu.estimate`` and
-so on. They print nothing.
+In: paths or objects.
+Out: the result object, files where an ``out`` is named. The one room of gfimu that knows the world and the wire.
 """

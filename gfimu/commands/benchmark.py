@@ -1,22 +1,33 @@
-"""Functions of `gfimu benchmark`: the benchmark of naming what a simulation gets wrong, from worlds to table."""
+"""Measure how well a method names what a simulation gets wrong: fixed worlds, a judge, baselines.
 
-from __future__ import annotations
+A method is a Python function, or a program in any language that reads the worlds as files and writes its answers as
+lines of JSON.
 
+Examples
+--------
+gfimu benchmark run greedy_bic --out greedy --sets own --limit 2
+gfimu benchmark judge greedy --out greedy.jsonl
+gfimu benchmark table greedy.jsonl
+"""
+
+import functools
 from collections.abc import Callable, Sequence
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from gfimu.commands.benchmark_results import BenchmarkList, BenchmarkRun, Judgement
-from gfimu.errors import InputError, unknown_name
-from gfimu.files.outputs import OutputFile, OutputFolder, writes
-from gfimu.optional_packages import require
+from gfimu.base.errors import InputError, unknown_name
+from gfimu.base.files.outputs import OutputFile, OutputFolder
+from gfimu.base.optional_packages import require
+from gfimu.commands.shell.declare import Option, command
+from gfimu.commands.shell.options import DATA, LIMIT, SETS, SPLIT, WORKERS
 
 if TYPE_CHECKING:
-    from sim.benchmark.answer import Answer
-    from sim.benchmark.judge import Judged
+    from gfimu.commands.benchmark_results import BenchmarkList, BenchmarkRun, BenchmarkWorlds
+    from sim.trials.benchmark.answer import Answer
+    from sim.trials.benchmark.judged import Judged
+    from sim.trials.benchmark.table import Judgement
 
-__all__ = ["BenchmarkList", "BenchmarkRun", "Judgement", "benchmark_list", "judge", "methods", "run", "table", "worlds"]
+__all__ = ["benchmark_list", "judge", "methods", "run", "table", "worlds"]
 
 OWN = "gfimu"
 """Name of the project's own method."""
@@ -26,61 +37,84 @@ _DRAWN = ("own", "independent", "unlisted", "dcmotor")
 _ANSWERS = "answers.jsonl"
 _SCHEMA = "answer.schema.json"
 _LINES = OutputFile("a file of judged answers", (".jsonl", ".xz"))
+_PROGRESS = Option("Called with the number of worlds that are done and of all.", shell=False)
 
 
 def methods() -> dict[str, str]:
     """Return the methods that come with the benchmark: name, and the function behind it."""
-    from sim.benchmark.baselines import BASELINES
+    from sim.trials.benchmark.baselines import BASELINES
 
     return {OWN: _OWN_METHOD, **BASELINES}
 
 
-def benchmark_list() -> BenchmarkList:
+def _of_list() -> tuple[type, ...]:
+    from gfimu.commands.benchmark_results import BenchmarkList
+
+    return (BenchmarkList,)
+
+
+@command("benchmark list", results=_of_list)
+def benchmark_list() -> "BenchmarkList":
     """List the sets of the benchmark, their sizes and licences, and the methods that come with it.
+
+    Writes nothing.
 
     Examples
     --------
     >>> import gfimu
     >>> found = gfimu.benchmark_list()
-    >>> [one["name"] for one in found.sets]
+    >>> [one.name for one in found.sets]
     ['own', 'independent', 'unlisted', 'dcmotor', 'real']
+
+    Shell
+    -----
+    gfimu benchmark list
+    # Hash of the release, sets and methods for a program
+    gfimu benchmark list --json
     """
-    from sim.benchmark.release import RELEASE, SETS, SPLITS, cases, release_hash
+    from gfimu.commands.benchmark_results import BenchmarkList
+    from sim.trials.benchmark.release import RELEASE, SETS, release_hash
 
-    sets = tuple(
-        {"name": one.name, "about": one.about, "licence": one.licence}
-        | {split: len(cases(one.name, split)) for split in SPLITS}
-        for one in SETS.values()
-    )
-    return BenchmarkList(RELEASE, release_hash(), sets, tuple(methods()))
+    return BenchmarkList(RELEASE, release_hash(), tuple(SETS.values()), tuple(methods()))
 
 
-@writes(out=OutputFolder((_SCHEMA,)))
+def _of_worlds() -> tuple[type, ...]:
+    from gfimu.commands.benchmark_results import BenchmarkWorlds
+
+    return (BenchmarkWorlds,)
+
+
+def _written_worlds(folders: list[Path], given: Any) -> "BenchmarkWorlds":
+    from gfimu.commands.benchmark_results import BenchmarkWorlds
+
+    return BenchmarkWorlds(tuple(str(folder.relative_to(given["out"])) for folder in folders))
+
+
+@command(
+    "benchmark worlds",
+    results=_of_worlds,
+    report=_written_worlds,
+    files=lambda _, given: {"worlds": given["out"], "schema": given["out"] / _SCHEMA},
+    doing="worlds",
+)
 def worlds(
-    out: str | Path,
+    out: Annotated[
+        str | Path,
+        Option(
+            "Folder to write: a folder per world, such as own/dev/007, and the schema of answers.",
+            "FOLDER",
+            kind=Path,
+            writes=OutputFolder((_SCHEMA,)),
+        ),
+    ],
     *,
-    sets: Sequence[str] = (),
-    split: str = "dev",
-    limit: int | None = None,
-    file_type: Literal["parquet", "csv"] = "parquet",
-    progress: Callable[[int, int], None] | None = None,
+    sets: Annotated[Sequence[str], SETS] = (),
+    split: Annotated[Literal["dev", "test"], SPLIT] = "dev",
+    limit: Annotated[int | None, LIMIT] = None,
+    file_type: Annotated[Literal["parquet", "csv"], Option("Type of the recordings.", "TYPE")] = "parquet",
+    progress: Annotated[Callable[[int, int], None] | None, _PROGRESS] = None,
 ) -> list[Path]:
     """Write worlds as plain files, for a method in any language: a recording and a twin each, no truth.
-
-    Parameters
-    ----------
-    out : str or Path
-        Folder; each world becomes a folder in it, such as ``own/dev/007``. The schema of answers stands beside them.
-    sets : sequence of str
-        Sets; by default all that are drawn.
-    split : {"dev", "test"}
-        Which worlds.
-    limit : int, optional
-        Only so many worlds of each set; they stand in a fixed random order.
-    file_type : {"parquet", "csv"}
-        Format of the recordings.
-    progress : callable, optional
-        Called with the number of worlds that are written and of all.
 
     Returns
     -------
@@ -91,81 +125,99 @@ def worlds(
     ------
     InputError
         If there is no such set, split or format.
+
+    Shell
+    -----
+    gfimu benchmark worlds --out worlds
+    # A few, as text
+    gfimu benchmark worlds --out worlds --sets own --limit 5 --file-type csv
     """
     import json
 
-    from gfimu.files.atomic_file import write_text
+    from gfimu.base.files.atomic_file import write_text
 
     require("gfimu benchmark", "mujoco")
-    from sim.benchmark.answer import answer_schema
-    from sim.benchmark.release import cases
-    from sim.benchmark.truth_file import task_of
+    from sim.trials.benchmark.answer import answer_schema
+    from sim.trials.benchmark.release import cases
+    from sim.trials.benchmark.truth_file import task_of
 
-    if file_type not in ("parquet", "csv"):
-        raise unknown_name("file type", file_type, ("parquet", "csv"))
     listed = [case.world for name in _chosen(sets) for case in cases(name, split)[:limit]]
-    report = progress or (lambda done, total: None)
     folders = []
-    for number, world in enumerate(listed):
+    for number, world in enumerate(listed, start=1):
         task, folder = task_of(world), Path(out) / world
         folder.mkdir(parents=True, exist_ok=True)
         task.recording.write(folder / f"recording.{file_type}")
         write_text(folder / "twin.toml", task.twin.to_toml())
         folders.append(folder)
-        report(number + 1, len(listed))
+        if progress is not None:
+            progress(number, len(listed))
     Path(out).mkdir(exist_ok=True)
     write_text(Path(out) / _SCHEMA, json.dumps(answer_schema(), indent=2) + "\n")
     return folders
 
 
-@writes(reads=("data",), out=OutputFolder(("plan.toml", _ANSWERS)))
+def _of_run() -> tuple[type, ...]:
+    from gfimu.commands.benchmark_results import BenchmarkRun
+
+    return (BenchmarkRun,)
+
+
+@command(
+    "benchmark run",
+    results=_of_run,
+    files=lambda run, _: {"answers": run.answers},
+    doing=lambda given: f"benchmark {given['method']}",
+    continues=True,
+)
 def run(
-    method: str,
+    method: Annotated[
+        str, Option("FILE.py:function, or a method that comes with the benchmark.", "METHOD", argument=True)
+    ],
     *,
-    out: str | Path,
-    sets: Sequence[str] = (),
-    split: str = "dev",
-    limit: int | None = None,
-    name: str = "",
-    workers: int | None = None,
-    data: str | Path | None = None,
-    progress: Callable[[int, int], None] | None = None,
-) -> BenchmarkRun:
+    out: Annotated[
+        str | Path,
+        Option(
+            "Folder to write; one that was begun is continued.",
+            "FOLDER",
+            kind=Path,
+            writes=OutputFolder(("plan.toml", _ANSWERS)),
+        ),
+    ],
+    sets: Annotated[Sequence[str], SETS] = (),
+    split: Annotated[Literal["dev", "test"], SPLIT] = "dev",
+    limit: Annotated[int | None, LIMIT] = None,
+    name: Annotated[str, Option("Name in tables; that of the file by default.", "NAME")] = "",
+    workers: Annotated[int | None, WORKERS] = None,
+    data: Annotated[str | Path | None, DATA] = None,
+    progress: Annotated[Callable[[int, int], None] | None, _PROGRESS] = None,
+) -> "BenchmarkRun":
     """Run a method over worlds; a second call goes on where one ended.
 
-    Parameters
-    ----------
-    method : str
-        ``FILE.py:function``, or the name of one that comes with the benchmark (`benchmark_list`). The function takes a
-        `sim.benchmark.world.Task` and returns an answer.
-    out : str or Path
-        Folder of the run; ``answers.jsonl`` in it holds the answers.
-    sets : sequence of str
-        Sets; by default all that are drawn.
-    split : {"dev", "test"}
-        Which worlds. Develop on ``dev``; run ``test`` once.
-    limit : int, optional
-        Only so many worlds of each set.
-    name : str
-        Name of the method in tables; by default that of its file and function.
-    workers : int, optional
-        Worker processes; by default as many as this process has processors.
-    data : str or Path, optional
-        Folder of the measured data, which the set ``real`` needs.
-    progress : callable, optional
-        Called with the number of worlds that are done and of all.
+    After Ctrl-C the finished worlds stay; the same command goes on with the others.
 
     Raises
     ------
     InputError
         If the method, a set or the split is not there, or the folder holds another run.
+
+    Notes
+    -----
+    The function takes a `sim.trials.benchmark.world.Task` and returns an answer.
+
+    Shell
+    -----
+    # A method of one's own, on the worlds to develop on
+    gfimu benchmark run my_method.py:answer --out mine
+    # A baseline, on a few worlds
+    gfimu benchmark run greedy_bic --out greedy --sets own --limit 10
     """
     require("gfimu benchmark", "mujoco")
-    from sim.benchmark.answer import write_answers
-    from sim.benchmark.methods import answers_of, benchmark_plan, benchmark_work, load_method
-    from sim.sweep.dataset import Dataset
-    from sim.sweep.engine import run_campaign
-    from sim.sweep.executors import open_workers, processors
+    from gfimu.commands.benchmark_results import BenchmarkRun
+    from sim.trials.benchmark.answer import write_answers
+    from sim.trials.benchmark.methods import answers_of, benchmark_plan, benchmark_work, load_method
+    from sim.trials.sweep.dataset import Dataset
+    from sim.trials.sweep.engine import run_campaign
+    from sim.trials.sweep.executors import open_workers, processors
 
     for option, value in (("--workers", workers), ("--limit", limit)):
         if value is not None and value < 1:
@@ -173,46 +225,59 @@ def run(
     reference = _reference(method)
     load_method(reference)  # one that is not there is reported before anything is written
     dataset = Dataset.create(out, benchmark_plan(reference, _chosen(sets), split, limit, _folder(data)))
-    run_campaign(dataset, benchmark_work, partial(open_workers, workers or processors()), progress=progress)
+    work = functools.partial(open_workers, workers or processors())
+    run_campaign(dataset, benchmark_work, work, progress=progress)
     called = name or (method if ".py:" not in method else f"{Path(method.rpartition(':')[0]).stem}")
     answers = answers_of(dataset, called)
     path = dataset.folder / _ANSWERS
     write_answers(answers, path)
-    return BenchmarkRun(
-        dataset.folder, path, called, len(answers), sum(answer.verdict == "error" for answer in answers)
-    )
+    failed = sum(answer.verdict == "error" for answer in answers)
+    return BenchmarkRun(dataset.folder, path, called, len(answers), failed)
 
 
-@writes(reads=("answers", "data"), out=_LINES)
+def _of_judgement() -> tuple[type, ...]:
+    from sim.trials.benchmark.table import Judgement
+
+    return (Judgement,)
+
+
+@command("benchmark judge", results=_of_judgement)
 def judge(
-    answers: str | Path | Sequence[str | Path],
+    answers: Annotated[
+        str | Path | Sequence[str | Path],
+        Option(
+            "Answers (.jsonl, .jsonl.xz), or folders of runs.",
+            "ANSWERS...",
+            kind=list[Path],
+            argument=True,
+            reads=True,
+        ),
+    ],
     *,
-    out: str | Path | None = None,
-    partial: bool = False,
-    data: str | Path | None = None,
-) -> Judgement:
-    """Judge answers by the truth of the release.
-
-    Parameters
-    ----------
-    answers : path or sequence of paths
-        Lines of JSON, one answer each (schema: ``answer.schema.json`` of `worlds`), or folders of runs.
-    out : str or Path, optional
-        File to write: the judged answers as lines of JSON, packed where the name ends in ``.xz``.
-    partial : bool
-        Whether the worlds of a set that a file lacks are left out; otherwise each of them counts as an error.
-    data : str or Path, optional
-        Folder of the measured data, for answers to worlds of the set ``real``.
+    out: Annotated[
+        str | Path | None,
+        Option("File to write: judged answers (.jsonl or .jsonl.xz).", "FILE", kind=Path, writes=_LINES, what="judged"),
+    ] = None,
+    partial: Annotated[bool, Option("Leave out worlds without an answer, instead of counting them as errors.")] = False,
+    data: Annotated[str | Path | None, DATA] = None,
+) -> "Judgement":
+    """Judge answers by the truth: right, in a set, unknown, missed, wrong; sizes, prediction, time.
 
     Raises
     ------
     InputError
         If a file is wrong, a world is not of the release, or has two answers by one method.
+
+    Shell
+    -----
+    gfimu benchmark judge mine --out mine.jsonl
+    # Answers of a program in another language, to some worlds of the split
+    gfimu benchmark judge answers.jsonl --partial
     """
     require("gfimu benchmark", "mujoco")
-    from sim.benchmark.judge import judge as judge_answers
-    from sim.benchmark.judged_file import write_judged
-    from sim.benchmark.table import summaries
+    from sim.trials.benchmark.judge import judge as judge_answers
+    from sim.trials.benchmark.judged_file import write_judged
+    from sim.trials.benchmark.table import Judgement
 
     judged: list[Judged] = []
     for file in [answers] if isinstance(answers, str | Path) else answers:
@@ -221,17 +286,19 @@ def judge(
         judged += judge_answers(complete, _folder(data))
     if out is not None:
         write_judged(judged, out)
-    return Judgement(tuple(judged), tuple(summaries(judged)))
+    return Judgement(tuple(judged))
 
 
-@writes(reads=("results",))
-def table(results: str | Path | Sequence[str | Path]) -> Judgement:
-    """Summarise judged answers of one or several methods: shares with 95 % intervals, points, calibration.
+@command("benchmark table", results=_of_judgement)
+def table(
+    results: Annotated[
+        str | Path | Sequence[str | Path],
+        Option("Judged answers, as judge --out writes them.", "RESULTS...", kind=list[Path], argument=True, reads=True),
+    ],
+) -> "Judgement":
+    """Summarise judged answers of one or several methods, with 95 % intervals: shares, points, calibration.
 
-    Parameters
-    ----------
-    results : path or sequence of paths
-        Files of judged answers, as `judge` writes them.
+    Writes nothing.
 
     Raises
     ------
@@ -239,21 +306,25 @@ def table(results: str | Path | Sequence[str | Path]) -> Judgement:
         If a file is wrong.
     MissingPackageError
         If MuJoCo is not installed.
+
+    Shell
+    -----
+    gfimu benchmark table mine.jsonl greedy.jsonl
+    # One method, for a program
+    gfimu benchmark table mine.jsonl --json
     """
     require("gfimu benchmark", "mujoco")
-    from sim.benchmark.judged_file import read_judged
-    from sim.benchmark.table import summaries
+    from sim.trials.benchmark.judged_file import read_judged
+    from sim.trials.benchmark.table import Judgement
 
-    judged: list[Judged] = []
-    for file in [results] if isinstance(results, str | Path) else results:
-        judged += read_judged(file)
-    return Judgement(tuple(judged), tuple(summaries(judged)))
+    files = [results] if isinstance(results, str | Path) else results
+    return Judgement(tuple(judged for file in files for judged in read_judged(file)))
 
 
-def _complete(path: Path, *, partial: bool) -> list[Answer]:
+def _complete(path: Path, *, partial: bool) -> "list[Answer]":
     """Return the answers of a file, with an error for each world of its sets and splits that it lacks."""
-    from sim.benchmark.answer import Answer, read_answers
-    from sim.benchmark.release import cases, find_case
+    from sim.trials.benchmark.answer import Answer, read_answers
+    from sim.trials.benchmark.release import cases, find_case
 
     found = read_answers(path)
     given: dict[tuple[str, str], Answer] = {}
@@ -287,7 +358,7 @@ def _folder(data: str | Path | None) -> str:
 
 
 def _chosen(sets: Sequence[str]) -> list[str]:
-    from sim.benchmark.release import SETS
+    from sim.trials.benchmark.release import SETS
 
     for name in sets:
         if name not in SETS:

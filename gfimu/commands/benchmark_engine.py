@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from sim.benchmark.world import Task
+    from sim.trials.benchmark.world import Task
 
 __all__ = ["answer"]
 

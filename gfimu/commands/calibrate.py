@@ -1,22 +1,47 @@
-"""Under `gfimu calibrate`: sensitivity, bias and alignment of the chips from a recording at rest."""
+"""Calibrate the accelerometers or the gyro of a recording, each parameter with its standard deviation.
 
-from __future__ import annotations
+Examples
+--------
+gfimu calibrate multi-position poses.csv --latitude 52.3 --height 80 --out calibration.json
+# Checked on other poses
+gfimu calibrate multi-position poses.csv --out calibration.json --check others.csv
+# Non-linearity on a turntable
+gfimu calibrate spin run.parquet --calibration static.json --out spin.json
+# A gyro on a rate table
+gfimu calibrate gyro x.csv --rate-table --also y.csv --also z.csv --table-axes x,y,z --out gyro.json
+"""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Any
 
-from gfimu.errors import InputError
-from gfimu.files.outputs import CALIBRATION, PICTURE, writes
+from gfimu.base.errors import InputError
+from gfimu.base.files.outputs import CALIBRATION as CALIBRATION_FILE
+from gfimu.calibration.registry import METHODS
+from gfimu.commands.shell import completion
+from gfimu.commands.shell.declare import Group, Option, command
+from gfimu.commands.shell.options import (
+    ARRAY,
+    FORCE,
+    GRAVITY,
+    LATITUDE,
+    MAP,
+    MAX_MEMORY,
+    PICTURE,
+    REST_THRESHOLD,
+)
 
 if TYPE_CHECKING:
+    from gfimu.array.array import AccelerometerArray
+    from gfimu.array.gravity import Latitude
+    from gfimu.base.files.memory import MemorySize
+    from gfimu.calibration.given import CalibrationPoses, CalibrationPrior, RateTable
     from gfimu.calibration.registry import CalibrationMethod
     from gfimu.calibration.result import Calibration
     from gfimu.commands.opened import Source
-    from gfimu.geometry.array import AccelerometerArray
-    from gfimu.importing import ColumnMap
     from gfimu.recording import Recording
+    from gfimu.recording.importing import ColumnMap
     from gfimu.recording.mapped import RecordingLike
 
 __all__ = ["calibrate"]
@@ -35,111 +60,156 @@ _OPTION_NAMES = {
 }
 """What the options are that some methods do not use, by the field of the task."""
 
+_METHOD = Option(f"Method: {', '.join(METHODS)}.", "METHOD", offers=completion.words(*METHODS), argument=True)
+_RECORDING = Option(
+    "Recording of static poses: .csv, .parquet, a MIMU4444 stream, or text rows time x y z.",
+    "RUN", kind=Path, argument=True, reads=True,
+)  # fmt: skip
+_OUT = Option("Calibration to write (.json).", kind=Path, writes=CALIBRATION_FILE, what="calibration", needed=True)
 
-@writes(
-    reads=("recording", "array", "motion", "update", "calibration", "check", "also", "column_map"),
-    out=CALIBRATION,
-    picture=PICTURE,
-)
+
+def _gravity(
+    gravity: Annotated[float | None, GRAVITY] = None,
+    latitude: Annotated[float | None, LATITUDE.also(": gravity from it")] = None,
+    height: Annotated[float, Option("Height above the ellipsoid, m.")] = 0.0,
+) -> "Latitude | float | None":
+    from gfimu.array.gravity import Latitude
+
+    if gravity is not None and latitude is not None:
+        raise InputError("give --gravity or --latitude, not both")
+    return gravity if latitude is None else Latitude(latitude, height)
+
+
+def _poses(
+    input_kind: Annotated[
+        str,
+        Option(
+            "Rows that the fit uses: averaged, raw or wavelet.",
+            "KIND",
+            name="--input",
+            offers=completion.words("averaged", "raw", "wavelet"),
+        ),
+    ] = "averaged",
+    wavelet_level: Annotated[int | None, Option("With --input wavelet: level of the transform; 4 by default.")] = None,
+    wavelet_threshold: Annotated[
+        str | None,
+        Option(
+            "With --input wavelet: leave out all details (none, the default), or those below the universal threshold "
+            "(soft or hard)."
+        ),
+    ] = None,
+    rest_threshold: Annotated[float | None, REST_THRESHOLD] = None,
+    min_rest: Annotated[float | None, Option("Shortest pose, s; 1 by default, 2 for array.")] = None,
+    levelling_std: Annotated[float | None, Option("Standard deviation of a pose's tilt per axis, rad.")] = None,
+) -> "CalibrationPoses":
+    from gfimu.calibration.given import CalibrationPoses
+
+    given = {"level": wavelet_level, "threshold": wavelet_threshold}
+    wavelet = {key: value for key, value in given.items() if value is not None}
+    return CalibrationPoses(rest_threshold, min_rest, levelling_std, input_kind, wavelet)
+
+
+def _prior(
+    update: Annotated[
+        Path | None,
+        Option("array: calibration of an earlier run to carry over; the biases may have moved.", reads=True),
+    ] = None,
+    turn_on_std: Annotated[
+        float | None,
+        Option("With --update, --calibration: turn-on repeatability of a bias, m/s²; 0.03 by default."),
+    ] = None,
+    bias_walk: Annotated[
+        float | None, Option("With --update: random walk of a bias between poses, m/s²/√s; 0 by default.")
+    ] = None,
+    calibration: Annotated[
+        Path | None, Option("spin: static calibration to start from, or that of another spin.", reads=True)
+    ] = None,
+    radius_std: Annotated[
+        float | None, Option("spin: standard deviation of a chip's place, m; 5e-4 by default.")
+    ] = None,
+    stretch_std: Annotated[
+        float | None, Option("spin: standard deviation of the arm stretch, s²/rad²; 1e-7 by default.")
+    ] = None,
+) -> "CalibrationPrior":
+    from gfimu.calibration.given import CalibrationPrior
+
+    return CalibrationPrior(update, calibration, turn_on_std, bias_walk, radius_std, stretch_std)
+
+
+def _rate_table(
+    rate_table: Annotated[bool, Option("gyro: RUN is of a rate table, whose tachometer is the reference.")] = False,
+    also: Annotated[
+        list[Path], Option("With --rate-table: a recording of the gyro mounted otherwise; repeat it.", reads=True)
+    ] = (),  # type: ignore[assignment]
+    table_axes: Annotated[
+        str, Option("Gyro's axis along the table's, of RUN and each --also: x,y,-z; else by file.")
+    ] = "",
+) -> "RateTable | None":
+    from gfimu.calibration.given import RateTable
+
+    if not (rate_table or also or table_axes):
+        return None
+    return RateTable(tuple(also), tuple(filter(None, table_axes.split(","))))
+
+
+def _results() -> tuple[type, ...]:
+    from gfimu.calibration.result import Calibration
+
+    return (Calibration,)
+
+
+@command(results=_results, doing="calibrating")
 def calibrate(
-    method: str,
-    recording: RecordingLike,
+    method: Annotated[str, _METHOD],
+    recording: Annotated["RecordingLike", _RECORDING],
     *,
-    out: str | Path | None = None,
-    array: AccelerometerArray | str | Path | None = None,
-    column_map: ColumnMap | str | Path | None = None,
-    map_set: Sequence[str] = (),
-    gravity: float | None = None,
-    latitude: float | None = None,
-    height: float = 0.0,
-    parameters: int | None = None,
-    input_kind: str = "averaged",
-    wavelet_level: int | None = None,
-    wavelet_threshold: str | None = None,
-    rest_threshold: float | None = None,
-    min_rest: float | None = None,
-    levelling_std: float | None = None,
-    motion: RecordingLike | None = None,
-    update: Calibration | str | Path | None = None,
-    turn_on_std: float | None = None,
-    bias_walk: float | None = None,
-    calibration: Calibration | str | Path | None = None,
-    radius_std: float | None = None,
-    stretch_std: float | None = None,
-    check: RecordingLike | None = None,
-    rate_table: bool = False,
-    also: Sequence[RecordingLike] = (),
-    table_axes: Sequence[str] | str = (),
-    picture: str | Path | None = None,
-    force: bool = False,
-    progress: Callable[[float], object] | None = None,
-    n_parameters: int | None = None,
-    min_rest_s: float | None = None,
-    levelling_std_rad: float | None = None,
-) -> Calibration:
+    out: Annotated["str | Path | None", _OUT] = None,
+    array: Annotated["AccelerometerArray | str | Path | None", ARRAY.also("; else the recording's own")] = None,
+    gravity: Annotated[
+        "Latitude | float | None",
+        Group(_gravity, "Local gravity, m/s², or the `gfimu.Latitude` it follows from; else standard gravity."),
+    ] = None,
+    parameters: Annotated[int | None, Option("Per chip: 12 (full matrix) or 9 (triangular).")] = None,
+    poses: Annotated[
+        "CalibrationPoses | None",
+        Group(_poses, "How poses are found and what the fit uses of them: a `gfimu.CalibrationPoses`."),
+    ] = None,
+    motion: Annotated[
+        "RecordingLike | None",
+        Option("array: recording of the motion, or of shakes (may be RUN).", kind=Path, reads=True),
+    ] = None,
+    prior: Annotated[
+        "CalibrationPrior | None",
+        Group(
+            _prior,
+            "For ``array`` and ``spin``: an earlier calibration, and how exactly it and the chips' places are known, "
+            "a `gfimu.CalibrationPrior`.",
+            reads=True,
+        ),
+    ] = None,
+    check: Annotated[
+        "RecordingLike | None",
+        Option("Other poses at rest, which the fit does not see: |a| − g on them.", kind=Path, reads=True),
+    ] = None,
+    rate_table: Annotated[
+        "RateTable | None",
+        Group(
+            _rate_table,
+            "For ``gyro``: the recording is of a rate table, whose rate (``tacho_rad_s``) is the reference; it may "
+            "hold references alone. A `gfimu.RateTable` names further recordings and the axes.",
+            reads=True,
+        ),
+    ] = None,
+    picture: Annotated["str | Path | None", PICTURE] = None,
+    force: Annotated[bool, FORCE] = False,
+    column_map: Annotated["ColumnMap | str | Path | None", MAP] = None,
+    max_memory: Annotated["MemorySize | None", MAX_MEMORY] = None,
+    progress: Annotated[
+        Callable[[float], object] | None,
+        Option("Called with the share done of a fit to shakes, 0 to 1.", shell=False),
+    ] = None,
+) -> "Calibration":
     """Calibrate the accelerometers of a recording, each parameter with its standard deviation.
-
-    Parameters
-    ----------
-    method : str
-        A key of `gfimu.calibration.registry.METHODS`.
-    recording : Recording, path, table, or times (n,) with readings (n, c)
-        Static poses in m/s² or raw counts, or the file.
-    out : str or Path, optional
-        Calibration file to write, ``.json``.
-    array : AccelerometerArray, str or Path, optional
-        The array, its name or file; the recording's own by default.
-    column_map : ColumnMap, str or Path, optional
-        What the columns of a foreign file are: a map, its name or TOML file (``--map``); see `gfimu.inspect`.
-    map_set : sequence of str
-        Keys of that map to set, such as ``"time.unit=ms"`` (``--map-set``); without a map they are all of it.
-    gravity : float, optional
-        Local gravity, m/s²; standard gravity by default.
-    latitude, height : float, optional
-        Latitude, degrees, and height above the ellipsoid, m, in place of ``gravity``.
-    parameters, n_parameters : {9, 12}, optional
-        Parameters per triad; two names of one argument.
-    input_kind : {"averaged", "raw", "wavelet"}
-        Rows that the fit uses (``--input``).
-    wavelet_level, wavelet_threshold : int and {"none", "soft", "hard"}, optional
-        With the wavelet input: level of the transform, 4 by default, and what becomes of its details: all are left out,
-        or those below the universal threshold (`gfimu.calibration.observations.denoised_samples`).
-    rest_threshold : float, optional
-        Threshold of rest, reading unit squared; chosen by the data if not given.
-    min_rest, min_rest_s : float, optional
-        Shortest pose, s; two names of one argument; 1 by default, 2 for ``array``.
-    levelling_std, levelling_std_rad : float, optional
-        Standard deviation of the tilt of a pose, rad; two names of one argument.
-    motion : Recording, str or Path, optional
-        For ``array``: recording with the motion. With a tachometer or gyro, positions are fitted to it; without, it
-        is taken for shakes by hand from rest to rest, which may be in ``recording`` itself.
-    update : Calibration, str or Path, optional
-        For ``array``: calibration of an earlier run to carry over.
-    turn_on_std, bias_walk : float, optional
-        With ``update``: change of a bias between power-ons, m/s², 0.03 by default; random walk between poses, m/s²/√s,
-        0 by default. The first also with ``calibration``.
-    calibration : Calibration, str or Path, optional
-        For ``spin``: static calibration to start from, or the result of another spin; else the data sheets.
-    radius_std, stretch_std : float, optional
-        For ``spin``: standard deviations of each coordinate of a chip, m, and of the arm stretch, s²/rad²
-        (`gfimu.calibration.spin.policy`).
-    check : Recording, str or Path, optional
-        Other poses at rest, which the fit does not see: ``|a| − g`` on them goes into the statistics
-        (`gfimu.calibration.check_poses`).
-    rate_table : bool
-        For ``gyro``: the recording is of a rate table, whose rate (``tacho_rad_s``) is the reference
-        (`gfimu.calibration.rate_table`); the same as the method ``gyro-rate-table``. It may hold references alone.
-    also : sequence of Recording, str or Path
-        With ``rate_table``: recordings of the gyro mounted otherwise.
-    table_axes : sequence of str or str
-        With ``rate_table``: the gyro's axis along the table's, up, of the recording and each of ``also``, such as
-        ``["x", "y", "-z"]`` or ``"x,y,-z"``; by default those of the recordings' mountings.
-    picture : str or Path, optional
-        Picture to write, ``.png``, ``.svg`` or ``.pdf``; its magnitudes are those of ``check``, where that is given.
-    force : bool
-        Go on, with a warning, where the checks of a recording would refuse it.
-    progress : callable, optional
-        Called with the share done of a fit to shakes, 0 to 1.
 
     Raises
     ------
@@ -154,88 +224,76 @@ def calibrate(
     >>> gfimu.calibrate("array", poses)
     Calibration(array, 12 channels in m/s², 60 parameters, 3 directions undetermined)
     """
+    from gfimu.array.gravity import Latitude
+    from gfimu.base.units import STANDARD_GRAVITY
     from gfimu.calibration.check_poses import check_on_poses
-    from gfimu.calibration.methods import CalibrationTask, RateTable, run_calibration
+    from gfimu.calibration.given import CalibrationPoses, CalibrationPrior, RateTable
+    from gfimu.calibration.methods import CalibrationTask, run_calibration
     from gfimu.calibration.registry import calibration_method
-    from gfimu.commands.opened import as_array, as_calibration, as_source, name_of
+    from gfimu.commands.opened import as_array, as_run, as_source, name_of
     from gfimu.recording.checks import examine
 
-    on_table = rate_table or bool(also) or bool(table_axes)
-    chosen = calibration_method("gyro-rate-table" if on_table and method == "gyro" else method)
-    given = {"level": wavelet_level, "threshold": wavelet_threshold}
-    wavelet = {key: value for key, value in given.items() if value is not None}
-    levelling = levelling_std_rad if levelling_std is None else levelling_std
-    count = n_parameters if parameters is None else parameters
+    rests, known = poses or CalibrationPoses(), prior or CalibrationPrior()
+    chosen = calibration_method("gyro-rate-table" if rate_table and method == "gyro" else method)
     _refuse_unused(
         chosen,
         motion=motion,
-        update=update,
-        levelling_std_rad=levelling,
-        n_parameters=count,
-        input_kind=None if input_kind == "averaged" and not wavelet else input_kind,
-        start=calibration,
-        radius_std_m=radius_std,
-        stretch_std_s2_rad2=stretch_std,
-        rate_table=on_table or None,
+        update=known.update,
+        levelling_std_rad=rests.levelling_std_rad,
+        n_parameters=parameters,
+        input_kind=None if rests.input_kind == "averaged" and not rests.wavelet else rests.input_kind,
+        start=known.start,
+        radius_std_m=known.radius_std_m,
+        stretch_std_s2_rad2=known.stretch_std_s2_rad2,
+        rate_table=rate_table,
     )
-    if update is None and (bias_walk is not None or (turn_on_std is not None and calibration is None)):
-        raise InputError("--turn-on-std and --bias-walk are of --update; give the calibration to carry over")
     drawing = None if array is None else as_array(array)
-    local_gravity = _gravity(gravity, latitude, height)
-    source = as_source(recording, array, column_map, map_set)
-    if on_table or "rate_table" in chosen.options:
-        if check is not None or picture is not None or drawing is not None or gravity is not None:
+    latitude = gravity if isinstance(gravity, Latitude) else None
+    local_gravity = gravity.gravity if isinstance(gravity, Latitude) else gravity
+
+    def read(one: "RecordingLike") -> "Source":
+        return as_source(one, array, column_map, max_memory=max_memory)
+
+    def checked(one: "RecordingLike") -> "Recording":
+        run = _uncalibrated(read(one), drawing)
+        examine(run, drawing, source=name_of(one), force=force)
+        return run
+
+    if "rate_table" in chosen.options:
+        if check is not None or picture is not None or drawing is not None or gravity is not latitude:
             raise InputError(
                 "--array, --gravity, --check and --picture are of accelerometers; leave them out for a gyro"
             )
-        task = CalibrationTask(
-            _references(source),
-            rest_threshold=rest_threshold,
-            min_rest_s=min_rest_s if min_rest is None else min_rest,
-            levelling_std_rad=levelling,
-            latitude_deg=latitude,
-            rate_table=RateTable(
-                tuple(_references(as_source(one, array, column_map, map_set)) for one in also),
-                tuple(filter(None, table_axes.split(","))) if isinstance(table_axes, str) else tuple(table_axes),
-                tuple(name_of(one) for one in (recording, *also)),
-            ),
+        table = rate_table or RateTable()
+        files = (recording, *table.also)
+        first, *also = (_references(read(one)) for one in files)
+        mounted = RateTable(also, table.axes, [name_of(one) for one in files])
+        degrees = None if latitude is None else latitude.deg
+        result = run_calibration(
+            chosen, CalibrationTask(first, latitude_deg=degrees, rate_table=mounted, **vars(rests))
         )
-        result = run_calibration(chosen, task)
         if out is not None:
             result.save(out)
         return result
-    run = _uncalibrated(source, drawing)
-    examine(run, drawing, source=name_of(recording), force=force)
-    turned = None if motion is None else _uncalibrated(as_source(motion, array, column_map, map_set), drawing)
-    if turned is not None:
-        examine(turned, drawing, source=name_of(motion), force=force)
-    others = None if check is None else _uncalibrated(as_source(check, array, column_map, map_set), drawing)
+    run = checked(recording)
+    turned = None if motion is None else checked(motion)
+    others = None if check is None else checked(check)
     if others is not None:
-        examine(others, drawing, source=name_of(check), force=force)
         _refuse_the_same(run, others, name_of(check))
     task = CalibrationTask(
         run,
-        gravity=local_gravity,
-        n_parameters=count,
-        input_kind=input_kind,
-        rest_threshold=rest_threshold,
-        min_rest_s=min_rest_s if min_rest is None else min_rest,
-        levelling_std_rad=levelling,
-        array=_own_array(source) if drawing is None and "array" in chosen.options else drawing,
+        gravity=STANDARD_GRAVITY if local_gravity is None else local_gravity,
+        n_parameters=parameters,
+        array=as_run(read(recording), None)[1] if drawing is None and "array" in chosen.options else drawing,
         motion=turned,
-        update=None if update is None else as_calibration(update),
-        start=None if calibration is None else as_calibration(calibration),
-        radius_std_m=radius_std,
-        stretch_std_s2_rad2=stretch_std,
-        turn_on_std_m_s2=0.03 if turn_on_std is None else turn_on_std,
-        bias_walk_m_s2_rt_s=bias_walk or 0.0,
-        wavelet=wavelet,
         progress=progress,
+        **vars(rests),
+        **_loaded(known),
     )
     result = run_calibration(chosen, task)
     if others is not None:
         rested = {} if task.min_rest_s is None else {"min_rest_s": task.min_rest_s}
-        figures = check_on_poses(result, others, rest_threshold=rest_threshold, **rested)
+        figures = check_on_poses(result, others, rest_threshold=task.rest_threshold, **rested)
         result = replace(result, statistics={**result.statistics, **figures})
     if out is not None:
         result.save(out)
@@ -246,7 +304,15 @@ def calibrate(
     return result
 
 
-def _refuse_the_same(run: Recording, others: Recording, name: str) -> None:
+def _loaded(prior: "CalibrationPrior") -> dict[str, Any]:
+    """Return what is known before, calibrations read from their files; without what the task has a default for."""
+    from gfimu.commands.opened import as_calibration
+
+    given = {name: value for name, value in vars(prior).items() if value is not None}
+    return given | {name: as_calibration(given[name]) for name in ("update", "start") if name in given}
+
+
+def _refuse_the_same(run: "Recording", others: "Recording", name: str) -> None:
     """Refuse to check a calibration on what it was made from."""
     import numpy as np
 
@@ -254,42 +320,23 @@ def _refuse_the_same(run: Recording, others: Recording, name: str) -> None:
         raise InputError(f"{name}: this is the recording of the fit; --check needs other poses")
 
 
-def _refuse_unused(method: CalibrationMethod, **given: object) -> None:
+def _refuse_unused(method: "CalibrationMethod", **given: object) -> None:
     """Refuse an option that the method would ignore."""
-    from gfimu.calibration.registry import METHODS
-
     for name, value in given.items():
         if value is not None and name not in method.options:
             users = " or ".join(other.name for other in METHODS.values() if name in other.options)
             raise InputError(f"{_OPTION_NAMES[name]}; use it with {users}, not {method.name}")
 
 
-def _uncalibrated(recording: Source, array: AccelerometerArray | None) -> Recording:
+def _uncalibrated(recording: "Source", array: "AccelerometerArray | None") -> "Recording":
     from gfimu.calibration.run_file import open_uncalibrated
     from gfimu.recording import Recording
 
     return recording if isinstance(recording, Recording) else open_uncalibrated(recording, array=array)
 
 
-def _references(recording: Source) -> Recording:
+def _references(recording: "Source") -> "Recording":
     from gfimu.calibration.run_file import open_references
     from gfimu.recording import Recording
 
     return recording if isinstance(recording, Recording) else open_references(recording)
-
-
-def _own_array(recording: Source) -> AccelerometerArray:
-    from gfimu.commands.opened import as_run
-
-    return as_run(recording, None)[1]
-
-
-def _gravity(gravity: float | None, latitude: float | None, height: float) -> float:
-    from gfimu.geometry.gravity import local_gravity
-    from gfimu.units import STANDARD_GRAVITY
-
-    if gravity is not None and latitude is not None:
-        raise InputError("give --gravity or --latitude, not both")
-    if latitude is not None:
-        return local_gravity(latitude, height)
-    return STANDARD_GRAVITY if gravity is None else gravity

@@ -1,122 +1,96 @@
-"""Under `gfimu campaign`: many simulated cases by a plan, kept as one dataset that a second call goes on with."""
+"""Run many simulated cases of a plan into one dataset, and summarise it; a second call continues the first.
 
-from __future__ import annotations
+The word run may be left out.
+
+Examples
+--------
+gfimu campaign plan.toml --out campaign
+# Its progress, from another terminal
+gfimu campaign status campaign
+"""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-from numpy.typing import NDArray
-
-from gfimu.files.outputs import OutputFolder, writes
-from gfimu.results import Panel, PlottedResult
+from gfimu.base.errors import InputError
+from gfimu.base.files.outputs import OutputFile, OutputFolder
+from gfimu.commands.shell.declare import Option, command
+from gfimu.commands.shell.options import BY, WORKERS
 
 if TYPE_CHECKING:
-    from sim.sweep.summary import Group
+    from sim.trials.sweep.results import CampaignResult, CampaignStatus, CampaignTable
 
-__all__ = ["CampaignResult", "campaign"]
+__all__ = ["campaign", "campaign_plot", "campaign_status", "campaign_table"]
 
-
-@dataclass(frozen=True)
-class CampaignResult(PlottedResult):
-    """Summary of a campaign's folder: cases, results and failures.
-
-    Parameters
-    ----------
-    folder : Path
-        The folder: ``plan.toml`` and one Parquet file per batch.
-    cases : int
-        Cases of the plan.
-    done : int
-        Cases whose row is there, failed ones included.
-    failures : dict of str to int
-        How many cases failed, by the reason.
-    groups : tuple of Group
-        Quantiles of each result by the values of the factors.
-
-    Examples
-    --------
-    >>> import gfimu
-    >>> gfimu.campaign("plan.toml", out="campaign").to_pandas()  # doctest: +SKIP
-    """
-
-    folder: Path
-    cases: int
-    done: int
-    failures: dict[str, int]
-    groups: tuple[Group, ...]
-
-    def to_columns(self) -> dict[str, NDArray[Any]]:
-        """Return one row per case that is done, with the columns of the dataset: factors, results, failure."""
-        from gfimu.files.table import as_found
-        from sim.sweep.dataset import Dataset
-
-        table = Dataset.open(self.folder).table()
-        return {name: as_found(table.column(name)) for name in table.column_names}
-
-    def _heading(self) -> str:
-        return f"Campaign in {self.folder}"
-
-    def _facts(self) -> list[tuple[str, str]]:
-        from gfimu.commands.campaign_views import progress_facts
-
-        return progress_facts(self.cases, self.done, self.failures)
-
-    def _shown(self) -> dict[str, NDArray[Any]]:
-        from gfimu.commands.campaign_views import group_columns
-
-        return group_columns(self.groups)
-
-    def _panels(self) -> list[Panel]:
-        from gfimu.commands.campaign_views import group_panels
-
-        return group_panels(self.groups)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the content for JSON."""
-        return {
-            "folder": str(self.folder),
-            "cases": self.cases,
-            "done": self.done,
-            "failures": self.failures,
-            "groups": [group.to_dict() for group in self.groups],
-        }
+_PICTURE = OutputFile(
+    "a picture", (".png", ".svg", ".html"), dict.fromkeys((".png", ".svg", ".html"), ("matplotlib",)), any_case=True
+)
+_FOLDER = Option("Folder of the campaign.", "DIR", kind=Path, argument=True, reads=True)
 
 
-@writes(reads=("plan",), out=OutputFolder(("plan.toml",)))
+def _results() -> Any:
+    from sim.trials.sweep import results
+
+    return results
+
+
+def _exit_code(result: "CampaignResult") -> int:
+    from gfimu.commands.shell.output import print_text
+
+    if not (result.ran and result.every_case_failed):
+        return 0
+    print_text("every case failed", style="yellow", stderr=True)
+    return 1
+
+
+@command(
+    results=lambda: (_results().CampaignResult,),
+    doing=lambda given: f"campaign {given['plan']}",
+    continues=True,
+    exit_code=_exit_code,
+)
 def campaign(
-    plan: str | Path,
+    plan: Annotated[
+        str | Path,
+        Option(
+            "Plan (.toml), or the folder of a campaign, of which nothing is run.",
+            "PLAN",
+            kind=Path,
+            argument=True,
+            reads=True,
+        ),
+    ],
     *,
-    out: str | Path | None = None,
-    by: Sequence[str] = (),
-    workers: int | None = None,
-    cluster: str = "",
-    progress: Callable[[int, int], None] | None = None,
-) -> CampaignResult:
-    """Run the cases of a plan that its folder lacks, and summarise all; or summarise a folder.
+    out: Annotated[
+        str | Path | None,
+        Option(
+            "Folder to write; one that was begun is continued.",
+            kind=Path,
+            writes=OutputFolder(("plan.toml",)),
+            what="campaign",
+        ),
+    ] = None,
+    by: Annotated[Sequence[str], BY] = (),
+    workers: Annotated[int | None, WORKERS.also("; with --cluster slurm, jobs", least=1)] = None,
+    cluster: Annotated[str, Option("Dask scheduler instead, such as tcp://host:8786, or slurm.")] = "",
+    progress: Annotated[
+        Callable[[int, int], None] | None,
+        Option("Called with the number of cases that are done and of all.", shell=False),
+    ] = None,
+) -> "CampaignResult":
+    """Run the cases of a plan that its folder lacks, and summarise them; or summarise a folder.
 
-    Parameters
-    ----------
-    plan : str or Path
-        The plan (.toml), or the folder of a campaign, of which nothing is run.
-    out : str or Path, optional
-        Folder of the campaign, with a plan.
-    by : sequence of str
-        Factors by whose values the results are grouped; all that are lists of values by default.
-    workers : int, optional
-        Worker processes, or jobs of Slurm; by default as many as this process has processors.
-    cluster : str
-        Address of a Dask scheduler, such as ``tcp://host:8786``, or ``slurm`` for jobs, in place of processes of this
-        machine.
-    progress : callable, optional
-        Called with the number of cases that are done and of all.
+    Exit code 1 if every case failed. After Ctrl-C the finished cases stay; the same command goes on with the others.
 
-    Returns
-    -------
-    CampaignResult
-        Counts, failures and quantiles.
+    Shell
+    -----
+    # A plan to edit, then its cases
+    gfimu new plan --out plan.toml
+    gfimu campaign plan.toml --out campaign
+    # Summarise a folder by a factor
+    gfimu campaign campaign --by method
 
     Raises
     ------
@@ -129,30 +103,154 @@ def campaign(
     >>> import gfimu
     >>> gfimu.campaign("plan.toml", out="campaign").plot()  # doctest: +SKIP
     """
-    from gfimu.commands.campaign_cases import KINDS, check_factors
-    from gfimu.errors import InputError
-    from sim.sweep.dataset import Dataset
-    from sim.sweep.design import Design
-    from sim.sweep.engine import run_campaign
-    from sim.sweep.executors import check_cluster, open_workers, processors
-    from sim.sweep.plan import load_plan
-    from sim.sweep.summary import failures, grouped
+    from sim.trials.campaign.cases import KINDS, check_factors
+    from sim.trials.sweep.dataset import Dataset
+    from sim.trials.sweep.design import Design
+    from sim.trials.sweep.engine import run_campaign
+    from sim.trials.sweep.executors import check_cluster, open_workers, processors
+    from sim.trials.sweep.plan import load_plan
+    from sim.trials.sweep.summary import failures, grouped
 
-    if workers is not None and workers < 1:
-        raise InputError(f"--workers {workers}: must be at least 1")
     if Path(plan).is_dir():
         if out is not None:
             raise InputError(f"{plan}: is the folder of a campaign; --out goes with a plan")
         dataset = Dataset.open(plan)
     else:
-        found = load_plan(plan)
-        check_factors(found, Design(found)[0], str(plan))
+        loaded = load_plan(plan)
+        check_factors(loaded, Design(loaded)[0], str(plan))
         if out is None:
             raise InputError(f"{plan}: give the folder of the campaign with --out")
         check_cluster(cluster)  # one that is not there is reported before anything is written
         opened = partial(open_workers, workers or processors(), cluster)
         dataset = Dataset.create(out, plan)
-        run_campaign(dataset, KINDS[found.kind], opened, progress=progress)
+        run_campaign(dataset, KINDS[loaded.kind], opened, progress=progress)
     table = dataset.table()
     groups = tuple(grouped(table, dataset.plan, list(by)))
-    return CampaignResult(dataset.folder, len(Design(dataset.plan)), len(table), failures(table), groups)
+    cases = len(Design(dataset.plan))
+    return _results().CampaignResult(dataset.folder, cases, len(table), failures(table), groups, ran=out is not None)
+
+
+@command("campaign status", results=lambda: (_results().CampaignStatus,))
+def campaign_status(folder: Annotated[str | Path, _FOLDER]) -> "CampaignStatus":
+    """Say how far a campaign is, also while another process runs it: cases, rate, time left, failures.
+
+    Writes nothing.
+
+    Shell
+    -----
+    gfimu campaign status campaign
+    # For a monitor
+    gfimu campaign status campaign --json
+
+    Raises
+    ------
+    InputError
+        If the folder holds no campaign, or a file in it is damaged.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> gfimu.campaign_status("campaign").done  # doctest: +SKIP
+    """
+    from sim.trials.sweep.dataset import Dataset
+    from sim.trials.sweep.design import Design
+    from sim.trials.sweep.pace import runs
+    from sim.trials.sweep.summary import failures
+
+    dataset = Dataset.open(folder)
+    running = tuple(runs(dataset))
+    table = dataset.table(["failure"])
+    cases = len(Design(dataset.plan))
+    return _results().CampaignStatus(dataset.folder, cases, len(table), failures(table), running)
+
+
+@command("campaign table", results=lambda: (_results().CampaignTable,), doing="reading the campaign")
+def campaign_table(
+    folder: Annotated[str | Path, _FOLDER],
+    *,
+    by: Annotated[Sequence[str], BY] = (),
+    csv: Annotated[
+        str | Path | None,
+        Option(
+            "File to write: the quantiles, one row per group.",
+            "FILE",
+            kind=Path,
+            writes=OutputFile("a table", (".csv",)),
+            what="quantiles",
+        ),
+    ] = None,
+) -> "CampaignTable":
+    """Print quantiles of each result by the values of factors, and which factors cause its variance.
+
+    Shell
+    -----
+    gfimu campaign table campaign --by method
+    # The quantiles as a file
+    gfimu campaign table campaign --by method --csv quantiles.csv
+
+    Raises
+    ------
+    InputError
+        If the folder holds no campaign, a file in it is damaged, or there is no such factor.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> gfimu.campaign_table("campaign").to_pandas()  # doctest: +SKIP
+    """
+    from sim.trials.sweep.dataset import Dataset
+    from sim.trials.sweep.design import Design
+    from sim.trials.sweep.sensitivity import seed_shares, sensitivities
+    from sim.trials.sweep.summary import grouped
+
+    dataset = Dataset.open(folder)
+    table, design = dataset.table(), Design(dataset.plan)
+    groups = tuple(grouped(table, dataset.plan, list(by)))
+    result = _results().CampaignTable(groups, tuple(sensitivities(table, design)), seed_shares(table, design))
+    if csv is not None:
+        result.write_csv(csv)
+    return result
+
+
+@command(
+    "campaign plot",
+    results=lambda: (_results().CampaignPlot,),
+    report=lambda drawn, given: _results().CampaignPlot(drawn),
+    doing="drawing",
+)
+def campaign_plot(
+    folder: Annotated[str | Path, _FOLDER],
+    *,
+    out: Annotated[
+        str | Path, Option("Picture to write (.png, .svg, .html).", kind=Path, writes=_PICTURE, what="picture")
+    ],
+    result: Annotated[
+        Sequence[str], Option("Result to draw; may be repeated. The first four by default.", "NAME", kind=list[str])
+    ] = (),
+) -> list[str]:
+    """Draw results against each factor, and which factors cause their variance; return the names of what is drawn.
+
+    An ``.html`` page holds the picture with the counts and the reasons of failures.
+
+    Shell
+    -----
+    gfimu campaign plot campaign --out campaign.png
+    # One result, to zoom into
+    gfimu campaign plot campaign --result rate_rmse_rad_s --out campaign.html
+
+    Raises
+    ------
+    InputError
+        If the folder holds no campaign or no result yet, a file in it is damaged, or there is no such result.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> gfimu.campaign_plot("campaign", out="campaign.png")  # doctest: +SKIP
+    """
+    from sim.trials.sweep.dataset import Dataset
+    from sim.trials.sweep.design import Design
+    from sim.trials.sweep.picture import campaign_picture
+
+    dataset = Dataset.open(folder)
+    return campaign_picture(out, dataset.folder, dataset.table(), Design(dataset.plan), list(result))

@@ -1,76 +1,84 @@
-"""Under `gfimu certificate`: a calibration stated in the terms of the standards, with its uncertainty budget."""
+"""State a calibration in the terms of IEEE 1293 and NIST, with expanded uncertainties and their budget.
 
-from __future__ import annotations
+Examples
+--------
+gfimu certificate calibration.json --item "cube no. 7" --date 2026-11-27 --out certificate
+# With the errors of the stage
+gfimu certificate calibration.json --stage plate.toml --out certificate
+# The array as an angular sensor
+gfimu certificate calibration.json --array cube12 --rest rest.parquet
+# Two laboratories
+gfimu certificate calibration.json --compare theirs.json
+"""
 
 import json
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-from gfimu.files.outputs import OutputFolder, writes
+from gfimu.base.files.outputs import OutputFolder
+from gfimu.commands.shell.declare import Option, command
+from gfimu.commands.shell.options import ARRAY, MAX_MEMORY
 
 if TYPE_CHECKING:
+    from gfimu.array.array import AccelerometerArray
+    from gfimu.base.files.memory import MemorySize
+    from gfimu.calibration.certificate.certificate import Certificate, Component, Sheet
+    from gfimu.calibration.certificate.stage.stage import Stage
     from gfimu.calibration.result import Calibration
-    from gfimu.certification.certificate import Certificate, Component, Sheet
-    from gfimu.geometry.array import AccelerometerArray
     from gfimu.recording.mapped import RecordingLike
-    from gfimu.uncertainty.stage import Stage
 
 __all__ = ["FOLDER", "certificate"]
 
 _SEED = 0
 """Numerical: of the simulated calibrations, so that a certificate comes out the same again."""
 
-FOLDER = OutputFolder(("certificate.json", "certificate.html"))
+FOLDER = OutputFolder(("certificate.json", "certificate.html"), meanings=("certificate", "page"))
 """What a certificate writes."""
 
+_CALIBRATION = Option("Calibration file, from `gfimu calibrate`.", "CAL", kind=Path, argument=True, reads=True)
+_COMPARE = Option("Another calibration or certificate of the same chips: E_n of each quantity.", kind=Path, reads=True)
+_STAGE = Option(
+    "Errors of stage and gravity, for the budget (.toml); gfimu new stage writes one to edit.", kind=Path, reads=True
+)
+_REST = Option(
+    "Recording at rest: noise and bias of that sheet; else the data sheets of the parts.", kind=Path, reads=True
+)
 
-@writes(reads=("calibration", "compare", "stage", "array", "rest"), out=FOLDER)
+
+@command(doing="stating the calibration")
 def certificate(
-    calibration: Calibration | str | Path,
+    calibration: Annotated["Calibration | str | Path", _CALIBRATION],
     *,
-    out: str | Path | None = None,
-    compare: Calibration | Certificate | str | Path | None = None,
-    stage: Stage | str | Path | None = None,
-    array: AccelerometerArray | str | Path | None = None,
-    rest: RecordingLike | None = None,
-    item: str = "",
-    date: str = "",
-    components: Iterable[Component] = (),
-    angular_sensor: Sheet | None = None,
-) -> Certificate:
+    out: Annotated[
+        "str | Path | None",
+        Option("Folder to write: certificate.json, certificate.html.", kind=Path, writes=FOLDER),
+    ] = None,
+    compare: Annotated["Calibration | Certificate | str | Path | None", _COMPARE] = None,
+    stage: Annotated["Stage | str | Path | None", _STAGE] = None,
+    array: Annotated[
+        "AccelerometerArray | str | Path | None", ARRAY.also(". Adds its sheet as an angular sensor (IEEE 671)")
+    ] = None,
+    rest: Annotated["RecordingLike | None", _REST] = None,
+    item: Annotated[str, Option("What was calibrated: part, serial number.")] = "",
+    date: Annotated[str, Option("When it was calibrated.")] = "",
+    max_memory: Annotated["MemorySize | None", MAX_MEMORY] = None,
+    components: Annotated[
+        "Iterable[Component]",
+        Option("Further components of type B for the budget, by name of the term.", shell=False),
+    ] = (),
+    angular_sensor: Annotated[
+        "Sheet | None",
+        Option("The array as an angular sensor, in place of ``array`` and ``rest``.", shell=False),
+    ] = None,
+) -> "Certificate":
     """State a calibration in the terms of IEEE 1293 and NIST, with expanded uncertainties and their budget.
-
-    Parameters
-    ----------
-    calibration : Calibration, str or Path
-        The calibration of accelerometers, or its file.
-    out : str or Path, optional
-        Folder to write: ``certificate.json``, ``certificate.html``.
-    compare : Calibration, Certificate, str or Path, optional
-        Another calibration or certificate of the same chips, or its file: E_n of every common quantity.
-    stage : Stage, str or Path, optional
-        What the laboratory states of the errors of its stage and of gravity, or its file (``gfimu new stage``):
-        components of type B, by simulated calibrations.
-    array : AccelerometerArray, str or Path, optional
-        The array, its name or file: adds the sheet of the whole array as an angular sensor (IEEE 671).
-    rest : Recording, str or Path, optional
-        Recording at rest: noise, bias and bias instability of that sheet; else the data sheets of the parts. The array
-        is the recording's own where none is given.
-    item : str
-        What was calibrated, such as part and serial number.
-    date : str
-        When it was calibrated.
-    components : iterable of Component
-        Further components of type B for the budget, by name of the term.
-    angular_sensor : Sheet, optional
-        The array as an angular sensor.
 
     Returns
     -------
     Certificate
-        `gfimu.certification.certificate.Certificate`.
+        `gfimu.calibration.certificate.certificate.Certificate`.
 
     Raises
     ------
@@ -83,10 +91,10 @@ def certificate(
     >>> import gfimu
     >>> gfimu.certificate("cal.json", item="unit 7").to_pandas()  # doctest: +SKIP
     """
-    from gfimu.certification.comparison import compare as compared
-    from gfimu.certification.page import write_certificate
+    from gfimu.calibration.certificate.comparison import compare as compared
+    from gfimu.calibration.certificate.page import write_certificate
+    from gfimu.calibration.certificate.stage.stage import Stage
     from gfimu.commands.opened import as_calibration
-    from gfimu.uncertainty.stage import Stage
 
     source = str(calibration) if isinstance(calibration, str | Path) else "calibration"
     fitted = as_calibration(calibration)
@@ -94,7 +102,7 @@ def certificate(
         fitted,
         Stage.load(stage) if isinstance(stage, str | Path) else stage,
         components=components,
-        angular_sensor=_sheet(fitted, array, rest) or angular_sensor,
+        angular_sensor=_sheet(fitted, array, rest, max_memory) or angular_sensor,
         item=item,
         date=date,
         source=source,
@@ -108,29 +116,30 @@ def certificate(
 
 
 def _sheet(
-    calibration: Calibration,
-    array: AccelerometerArray | str | Path | None,
-    rest: RecordingLike | None,
-) -> Sheet | None:
+    calibration: "Calibration",
+    array: "AccelerometerArray | str | Path | None",
+    rest: "RecordingLike | None",
+    max_memory: "MemorySize | None",
+) -> "Sheet | None":
     """Return the sheet of the array as an angular sensor; None where neither array nor recording is given."""
-    from gfimu.certification.angular import angular_sensor_sheet
+    from gfimu.calibration.certificate.angular import angular_sensor_sheet
     from gfimu.commands.opened import as_array, as_calibrated_run, as_run, as_source
 
     if rest is None:
         return None if array is None else angular_sensor_sheet(calibration, as_array(array))
-    source = as_source(rest, array)
+    source = as_source(rest, array, max_memory=max_memory)
     corrected, _ = as_calibrated_run(source, array, calibration)
     return angular_sensor_sheet(calibration, as_run(source, array)[1], rest=corrected)
 
 
 def _certified(
-    calibration: Calibration, stage: Stage | None, *, components: Iterable[Component] = (), **stated: Any
-) -> Certificate:
+    calibration: "Calibration", stage: "Stage | None", *, components: "Iterable[Component]" = (), **stated: Any
+) -> "Certificate":
     """Certify a calibration with the components of the stage, and others."""
     import numpy as np
 
-    from gfimu.certification.certify import certify
-    from gfimu.uncertainty.components import stage_components
+    from gfimu.calibration.certificate.certify import certify
+    from gfimu.calibration.certificate.stage.components import stage_components
 
     simulated = stage_components(calibration, stage, rng=np.random.default_rng(_SEED))
     found = certify(
@@ -142,18 +151,18 @@ def _certified(
     return replace(found, statements=(*found.statements, *simulated.statements))
 
 
-def _other(given: Calibration | Certificate | str | Path, name: str) -> Certificate:
+def _other(given: "Calibration | Certificate | str | Path", name: str) -> "Certificate":
     """Return a certificate given as such, as a calibration, or as the file of either."""
+    from gfimu.base.errors import InputError
+    from gfimu.base.files.input_file import LARGEST_TEXT, check_input
+    from gfimu.calibration.certificate.certificate import FORMAT, Certificate
     from gfimu.calibration.result import Calibration
-    from gfimu.certification.certificate import FORMAT, Certificate
-    from gfimu.errors import InputError
-    from gfimu.files.input_file import check_input
 
     if isinstance(given, Certificate):
         return given
     if isinstance(given, Calibration):
         return _certified(given, None, source=name)
-    file = check_input(given)
+    file = check_input(given, largest=LARGEST_TEXT)
     try:
         data = json.loads(file.read_text(encoding="utf-8"))
     except OSError as error:

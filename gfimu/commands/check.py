@@ -1,43 +1,49 @@
-"""Under `gfimu check` and `gfimu diagnose --check`: what recordings can show before they are explained."""
+"""Check recordings before a diagnosis: data quality, effects that their motion separates, what to record next.
 
-from __future__ import annotations
+Writes nothing.
+
+Examples
+--------
+gfimu check run.parquet --twin cube12_turntable
+# Several recordings of one rig
+gfimu check slow.parquet fast.parquet --twin cube12_turntable
+"""
 
 import os
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-from gfimu.files.outputs import writes
+from gfimu.commands.shell.declare import command
+from gfimu.commands.shell.options import ALLOW_CODE, MAP, MAX_MEMORY, RECORDINGS, TWIN
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from gfimu.base.files.memory import MemorySize
     from gfimu.diagnosis.design.run_check import RunCheck
-    from gfimu.importing import ColumnMap
+    from gfimu.model.world_model import WorldModel
+    from gfimu.recording.importing import ColumnMap
     from gfimu.recording.mapped import RecordingLike
-    from gfimu.world_model import WorldModel
 
 __all__ = ["check"]
 
 
-@writes(reads=("recordings", "twin", "column_map"))
-def check(
-    recordings: RecordingLike | Sequence[RecordingLike],
-    twin: WorldModel | str | Path,
-    *,
-    column_map: ColumnMap | str | Path | None = None,
-    map_set: Sequence[str] = (),
-) -> RunCheck:
-    """Check recordings before a diagnosis: data quality, effects that their motion separates, what to record next.
+def _results() -> tuple[type, ...]:
+    from gfimu.diagnosis.design.run_check import RunCheck
 
-    Parameters
-    ----------
-    recordings : Recording, path, table, (times, readings), or sequence of these
-        Runs of one rig.
-    twin : WorldModel, str or Path
-        The simulation to check: a twin, its name or file, or a simulation of one's own (``rig.py:function``).
-    column_map : ColumnMap, str or Path, optional
-        What the columns of a foreign file are: a map, its name or TOML file (``--map``).
-    map_set : sequence of str
-        Keys of that map to set, such as ``"time.unit=ms"`` (``--map-set``); without a map they are all of it.
+    return (RunCheck,)
+
+
+@command(results=_results, doing="looking at the recordings")
+def check(
+    recordings: Annotated["RecordingLike | Sequence[RecordingLike]", RECORDINGS],
+    twin: Annotated["WorldModel | str | Path", TWIN],
+    *,
+    allow_code: Annotated[bool, ALLOW_CODE] = False,
+    column_map: Annotated["ColumnMap | str | Path | None", MAP] = None,
+    max_memory: Annotated["MemorySize | None", MAX_MEMORY] = None,
+) -> "RunCheck":
+    """Check recordings before a diagnosis: data quality, effects that their motion separates, what to record next.
 
     Raises
     ------
@@ -57,8 +63,8 @@ def check(
     from gfimu.recording import Recording
     from gfimu.recording.formats import open_recording
 
-    model = as_twin(twin)
-    given = [as_source(one, model.array, column_map, map_set) for one in as_runs(recordings)]
+    model = as_twin(twin, allow_code=allow_code)
+    given = [as_source(one, model.array, column_map, max_memory=max_memory) for one in as_runs(recordings)]
     read = [one if isinstance(one, Recording) else open_recording(one, array=model.array) for one in given]
     names = [
         Path(one).name if isinstance(one, str | os.PathLike) else f"run {number}"

@@ -1,75 +1,125 @@
-"""Under `gfimu convert`: a recording in another format, a calibration as YAML, an array as a MuJoCo model."""
+r"""Convert a recording between CSV and Parquet, or import MIMU4444 streams and foreign files. Readings become m/s².
 
-from __future__ import annotations
+Examples
+--------
+gfimu convert exp_1.bin.gz run.parquet
+# A Klipper recording
+gfimu convert adxl345-x.csv run.parquet --map klipper
+# One file per chip on a common clock
+gfimu convert chip1.csv chip2.csv run.parquet --map klipper --array mine.toml
+# A plain csv, no map written
+gfimu convert log.csv run.csv --map-set time.column=ms --map-set time.unit=ms --map-set unit=g \
+    --map-set channels.a11=ax --map-set channels.a12=ay --map-set channels.a13=az
+# A damaged recording
+gfimu convert run.csv clean.csv --drop corrupt,duplicates
+# For ROS 2
+gfimu convert run.parquet run.mcap
+# A calibration for Kalibr
+gfimu convert cal.json imu.yaml --to kalibr --array mine.toml --noise rest.parquet
+# An array as a MuJoCo model
+gfimu convert mine.toml mine.xml --to motor_turntable
+"""
 
 import os
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-from gfimu.errors import InputError
-from gfimu.files.outputs import EXPORT, writes
+from gfimu.base.errors import InputError
+from gfimu.base.files.outputs import EXPORT
+from gfimu.commands.shell.completion import words
+from gfimu.commands.shell.declare import Option, command
+from gfimu.commands.shell.options import ARRAY, MAP_OF_TABLE, MAX_MEMORY
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from typing import Any
+
+    from gfimu.array.array import AccelerometerArray
+    from gfimu.base.files.memory import MemorySize
     from gfimu.calibration.result import Calibration
-    from gfimu.geometry.array import AccelerometerArray
-    from gfimu.importing import ColumnMap
+    from gfimu.commands.converted import Converted, ConvertedArray, ConvertedCalibration
+    from gfimu.commands.opened import Source
     from gfimu.recording import Recording
+    from gfimu.recording.importing import ColumnMap
     from gfimu.recording.mapped import RecordingLike
     from gfimu.sensor_noise import RecordingNoise
 
 __all__ = ["convert"]
 
 
-@writes(reads=("source", "array", "column_map", "noise"), target=EXPORT)
+def _results() -> tuple[type, ...]:
+    from gfimu.commands.converted import Converted, ConvertedArray, ConvertedCalibration
+
+    return Converted, ConvertedArray, ConvertedCalibration
+
+
+def _report(
+    found: "Recording | Calibration | AccelerometerArray", given: "Mapping[str, Any]"
+) -> "Converted | ConvertedArray | ConvertedCalibration":
+    from gfimu.commands.converted import converted
+
+    return converted(found, given)
+
+
+def _kind_of(target: "str | Path") -> str:
+    """Return what a file of that name holds."""
+    return {".xml": "model", ".yaml": "calibration", ".yml": "calibration"}.get(Path(target).suffix, "recording")
+
+
+@command(results=_results, report=_report, doing="converting")
 def convert(
-    source: RecordingLike | Calibration | AccelerometerArray | Sequence[str | Path],
-    target: str | Path | None = None,
+    source: Annotated[
+        "RecordingLike | Calibration | AccelerometerArray | Sequence[str | Path]",
+        Option(
+            "Recording: .csv, .parquet, a MIMU4444 stream, or with --map a foreign file, one per chip; "
+            "or a calibration (.json), or an array (a name or .toml).",
+            "SOURCE...", kind=list[Path], argument=True, reads=True,
+        ),
+    ],
+    target: Annotated[
+        "str | Path | None",
+        Option(
+            "File to write: .csv, .parquet, .mcap (ROS 2), .euroc (a folder); .yaml of a calibration; .xml of an "
+            "array, for MuJoCo.",
+            "TARGET", kind=Path, argument=True, needed=True, writes=EXPORT, what=_kind_of,
+        ),
+    ] = None,
     *,
-    array: AccelerometerArray | str | Path | None = None,
-    column_map: ColumnMap | str | Path | None = None,
-    map_set: Sequence[str] = (),
-    drop: str | Sequence[str] = (),
-    table: str | None = None,
-    to: str | None = None,
-    lsb_m_s2: float | None = None,
-    chip: str | None = None,
-    noise: RecordingNoise | Recording | str | Path | None = None,
-) -> Recording | Calibration | AccelerometerArray:
+    array: Annotated[
+        "AccelerometerArray | str | Path | None",
+        ARRAY.also("; its channels must be there, else every channel found is taken"),
+    ] = None,
+    column_map: Annotated["ColumnMap | str | Path | None", MAP_OF_TABLE] = None,
+    max_memory: Annotated["MemorySize | None", MAX_MEMORY] = None,
+    drop: Annotated[
+        "str | Sequence[str]",
+        Option(
+            "Rows to leave out, counted: corrupt, out_of_range, missing, duplicates, unordered.", "KIND,...", kind=str
+        ),
+    ] = "",
+    to: Annotated[
+        str | None,
+        Option(
+            "Of a calibration, the format: kalibr or ros. Of an array: turntable, motor_turntable or free_cube.",
+            "FORMAT",
+            offers=words("kalibr", "ros", "turntable", "motor_turntable", "free_cube"),
+        ),
+    ] = None,
+    lsb_m_s2: Annotated[
+        float | None, Option("Of a calibration for counts: m/s² per count, as the sensor's driver has it.")
+    ] = None,
+    chip: Annotated[str | None, Option("Of a calibration: the one chip to export.")] = None,
+    noise: Annotated[
+        "RecordingNoise | Recording | str | Path | None",
+        Option("Of a calibration: recording at rest, for noise and sample rate.", "FILE", kind=Path, reads=True),
+    ] = None,
+) -> "Recording | Calibration | AccelerometerArray":  # fmt: skip
     """Read a recording in any format that is known, in m/s², and write it as CSV, Parquet, MCAP or EuRoC.
 
     Or read a calibration and write it as Kalibr's or imu_calib's YAML; or an array and write it as a MuJoCo model.
-
-    Parameters
-    ----------
-    source : Recording, Calibration, AccelerometerArray, path, table, or times (n,) with readings (n, c)
-        A calibration, or its ``.json`` file; an array, or its ``.toml`` file; or a recording, or its file: CSV,
-        Parquet, a MIMU4444 stream, or a foreign file with its column map; one file per chip on a common clock, with a
-        map.
-    target : str or Path, optional
-        Recording to write: ``.csv`` or ``.parquet``; ``.mcap`` with a topic of ``sensor_msgs/Imu`` per tri-axial chip;
-        ``.euroc``, a folder in the layout of EuRoC / ASL. Of a calibration: ``.yaml``. Of an array: ``.xml``.
-    array : AccelerometerArray, str or Path, optional
-        Array whose channels must be there; every channel found by default.
-    column_map : ColumnMap, str or Path, optional
-        What the columns of a foreign file are: a map, its name or TOML file (``--map``); see `gfimu.inspect`.
-    map_set : sequence of str
-        Keys of that map to set, such as ``"time.unit=ms"`` (``--map-set``); without a map they are all of it.
-    drop : str or sequence of str
-        Rows to leave out, counted and reported: ``corrupt``, ``out_of_range``, ``missing``, ``duplicates``,
-        ``unordered`` (see `gfimu.recording.filtered`).
-    table : str, optional
-        With a map: the table, topic or member of a file that holds several.
-    to : {"kalibr", "ros", "turntable", "motor_turntable", "free_cube"}, optional
-        Of a calibration, the format: `gfimu.exporting.kalibr`, `gfimu.exporting.ros`. Of an array, what carries it in
-        the MuJoCo model (`sim.rigs.mjcf_export`), by default the turntable.
-    lsb_m_s2 : float, optional
-        Of a calibration for raw counts: size of a count by which the sensor's driver makes m/s² of counts; by default
-        that of the array's parts.
-    chip : str, optional
-        Of a calibration: the one chip to export; all by default.
-    noise : RecordingNoise, Recording, str or Path, optional
-        Of a calibration: a recording at rest for the noise, or what `gfimu.noise` found; by default the data sheets'.
+    MCAP has a topic of ``sensor_msgs/Imu`` per tri-axial chip, ``.euroc`` is a folder in the layout of EuRoC / ASL. By
+    default a count has the size that the array's parts state, all chips of a calibration are exported, with the noise
+    of the data sheets, and a turntable carries an array.
 
     Returns
     -------
@@ -88,12 +138,7 @@ def convert(
     """
     from gfimu.commands.export_array import export_array
     from gfimu.commands.export_calibration import export_calibration
-    from gfimu.commands.opened import as_array, as_source, files_by_map, name_of
-    from gfimu.recording import Recording
-    from gfimu.recording.carried_array import carried_array
-    from gfimu.recording.checks import examine
-    from gfimu.recording.formats import open_recording
-    from gfimu.recording.mapped import MappedFile
+    from gfimu.commands.opened import as_array
 
     drawn = _array(source, target)
     if drawn is not None:
@@ -104,57 +149,90 @@ def convert(
     calibration = _calibration(source)
     if calibration is not None:
         export_calibration(
-            calibration, target, to=to, array=drawing, lsb_m_s2=lsb_m_s2, chip=chip, noise=noise, map_set=map_set
+            calibration,
+            target,
+            to=to,
+            array=drawing,
+            lsb_m_s2=lsb_m_s2,
+            chip=chip,
+            noise=noise,
+            column_map=column_map,
+            max_memory=max_memory,
         )
         return calibration
     if (to, lsb_m_s2, chip, noise) != (None, None, None, None):
         raise InputError("--to, --lsb-m-s2, --chip and --noise are for a calibration (.json, from gfimu calibrate)")
-    given = _given(source)
-    changes = [*map_set, *_dropping(drop)]
-    if isinstance(given[0], Recording | MappedFile):
-        given = [as_source(given[0], map_set=changes), *given[1:]]
-    elif not isinstance(given[0], str | Path):
-        given = [as_source(given[0], drawing, column_map, changes), *given[1:]]
-    elif column_map is not None or changes:
-        files = [one for one in given if isinstance(one, str | Path)]
-        given = [files_by_map(files, column_map, table, changes)]
-    if len(given) > 1:
-        raise InputError(f"{given[1]}: several files need --map, which says what the columns of each chip's file are")
-    recording = given[0] if isinstance(given[0], Recording) else open_recording(as_source(given[0]), array=drawing)
-    if recording.unit == "m_s2":
-        examine(recording, drawing, source=name_of(given[0]), force=True)  # a conversion is how a file is mended
-    if drawing is not None:
-        recording = recording.carrying(drawing)
-    elif "array_toml" in recording.metadata:
-        named = os.fspath(given[0]) if isinstance(given[0], str | os.PathLike) else "the recording"
-        carried_array(recording.metadata, source=named)  # a damaged one is not passed on
+    recording = _read(_given(source), drawing, column_map, drop, max_memory)
     if target is not None:
         _write(recording, Path(target))
     return recording
 
 
-def _dropping(drop: str | Sequence[str]) -> list[str]:
-    """Return the change of a column map that leaves rows out."""
+def _read(
+    given: "list[RecordingLike]",
+    drawing: "AccelerometerArray | None",
+    column_map: "ColumnMap | str | Path | None",
+    drop: "str | Sequence[str]",
+    max_memory: "MemorySize | None",
+) -> "Recording":
+    """Return the recording that one source, or a file per chip, holds."""
+    from gfimu.commands.opened import as_source, files_by_map, name_of
+    from gfimu.recording import Recording
+    from gfimu.recording.carried_array import carried_array
+    from gfimu.recording.checks import examine
+    from gfimu.recording.formats import open_recording
+    from gfimu.recording.mapped import MappedFile
+
+    first, *others = given
+    if column_map is None and isinstance(first, MappedFile):
+        column_map = first.column_map
+    chosen = _dropping(column_map, drop)
+    source: Source
+    if chosen is not None and isinstance(first, str | Path):
+        source = files_by_map([one for one in given if isinstance(one, str | Path)], chosen)
+    elif others:
+        raise InputError(f"{others[0]}: several files need --map, which says what the columns of each chip's file are")
+    else:
+        source = as_source(first, drawing, chosen)
+    recording = (
+        source if isinstance(source, Recording) else open_recording(source, array=drawing, max_memory=max_memory)
+    )
+    if recording.unit == "m_s2":
+        examine(recording, drawing, source=name_of(source), force=True)  # a conversion is how a file is mended
+    if drawing is not None:
+        return recording.carrying(drawing)
+    if "array_toml" in recording.metadata:
+        named = os.fspath(source) if isinstance(source, str | os.PathLike) else "the recording"
+        carried_array(recording.metadata, source=named)  # a damaged one is not passed on
+    return recording
+
+
+def _dropping(
+    column_map: "ColumnMap | str | Path | None", drop: "str | Sequence[str]"
+) -> "ColumnMap | str | Path | None":
+    """Return a column map that leaves out rows of some kinds, too."""
+    from gfimu.recording.importing import load_map
+
     kinds = drop if isinstance(drop, str) else ",".join(drop)
-    return [f"drop={kinds}"] if kinds else []
+    return load_map(column_map, [f"drop={kinds}"]) if kinds else column_map
 
 
-def _write(recording: Recording, target: Path) -> None:
+def _write(recording: "Recording", target: Path) -> None:
     """Write a recording in the format that the ending of a file says."""
     if target.suffix in {".yaml", ".yml"}:
         raise InputError(f"{target}: YAML is for calibrations; write a recording as .csv, .parquet, .mcap or .euroc")
     if target.suffix in {".mcap", ".euroc"}:
-        from gfimu.exporting import write_euroc, write_mcap
+        from gfimu.calibration.exporting import write_euroc, write_mcap
 
         (write_mcap if target.suffix == ".mcap" else write_euroc)(target, recording)
     else:
         recording.write(target)
 
 
-def _array(source: object, target: str | Path | None) -> AccelerometerArray | None:
+def _array(source: object, target: "str | Path | None") -> "AccelerometerArray | None":
     """Return the array that is to be converted: one itself, or what is named where the target is a MuJoCo model."""
+    from gfimu.array.array import AccelerometerArray
     from gfimu.commands.opened import as_array
-    from gfimu.geometry.array import AccelerometerArray
 
     if isinstance(source, list | tuple) and len(source) == 1:
         source = source[0]
@@ -167,7 +245,7 @@ def _array(source: object, target: str | Path | None) -> AccelerometerArray | No
     return as_array(source)
 
 
-def _calibration(source: object) -> Calibration | None:
+def _calibration(source: object) -> "Calibration | None":
     """Return the calibration that is to be converted; None for a recording."""
     from gfimu.calibration.result import Calibration, load_calibration
 
@@ -179,8 +257,8 @@ def _calibration(source: object) -> Calibration | None:
 
 
 def _given(
-    source: RecordingLike | Calibration | AccelerometerArray | Sequence[str | Path],
-) -> list[RecordingLike]:
+    source: "RecordingLike | Calibration | AccelerometerArray | Sequence[str | Path]",
+) -> "list[RecordingLike]":
     """Return one source or several as a list."""
     from gfimu.commands.opened import is_arrays
 

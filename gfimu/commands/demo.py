@@ -1,85 +1,75 @@
-"""Under `gfimu demo`: the whole job on the paper's run."""
+"""Run the paper's experiment in simulation: geometry, recording, estimate, drift, picture, diagnosis.
 
-from __future__ import annotations
+Writes a folder with the recording, the estimate, pictures, a rerun recording and the diagnosis with its report. It
+takes about a minute.
 
+Examples
+--------
+gfimu demo
+# Another draw of the noise, in a folder of your own
+gfimu demo --out demo --seed 2
+"""
+
+import sys
+import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-from numpy.typing import NDArray
-
+from gfimu.base.files.outputs import OutputFolder, check_outputs
+from gfimu.base.optional_packages import require
 from gfimu.commands.diagnose import FOLDER as DIAGNOSIS
-from gfimu.files.outputs import OutputFolder, check_outputs, writes
-from gfimu.optional_packages import require
-from gfimu.results import TableResult, text_column
+from gfimu.commands.shell.declare import Option, command
+from gfimu.commands.shell.options import SEED
 
 if TYPE_CHECKING:
-    from gfimu.commands.demo_steps import Row
+    from gfimu.commands.demo_steps import DemoResult
 
-__all__ = ["DemoResult", "demo"]
+__all__ = ["FOLDER", "demo"]
 
 FOLDER = OutputFolder(("run.parquet", "estimate.parquet", "calibration.json", "run.rrd", "hidden.parquet"))
 """What the folder of the demo holds, beside the folder ``diagnosis``."""
 
 
-@dataclass(frozen=True)
-class DemoResult(TableResult):
-    """Results of the demo, and the files that it wrote.
+def _results() -> tuple[type, ...]:
+    from gfimu.commands.demo_steps import DemoResult
 
-    Parameters
-    ----------
-    seed : int
-        Seed of all random numbers.
-    rows : tuple of Row
-        The table: questions, answers, what to compare them with.
-    files : mapping of str to Path
-        What was written, by its meaning.
-
-    Examples
-    --------
-    >>> import gfimu
-    >>> gfimu.demo("gfimu-demo").rows  # doctest: +SKIP
-    """
-
-    seed: int
-    rows: tuple[Row, ...]
-    files: Mapping[str, Path]
-
-    def to_columns(self) -> dict[str, NDArray[Any]]:
-        """Return one row per question: the answer, and what to compare it with."""
-        keys = {"what": "what", "result": "result", "to_compare": "beside"}
-        return {name: text_column(getattr(row, key) for row in self.rows) for name, key in keys.items()}
-
-    def _heading(self) -> str:
-        return f"The paper's experiment in simulation (seed {self.seed})"
-
-    def _notes(self) -> tuple[str, ...]:
-        return tuple(f"{meaning}: {path}" for meaning, path in self.files.items())
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the content of ``gfimu demo --json``."""
-        return {
-            "seed": self.seed,
-            "results": [{"what": row.what} | row.figures for row in self.rows],
-            "files": dict(self.files),
-        }
+    return (DemoResult,)
 
 
-@writes(out=FOLDER)
+def _run(given: Mapping[str, Any], as_json: bool) -> None:
+    from gfimu.commands.shell.output import print_json, print_text
+    from gfimu.commands.shell.printing import print_blocks
+
+    began = time.perf_counter()
+    watched = sys.stderr.isatty()
+
+    def report(number: int, total: int, what: str) -> None:
+        if watched:
+            print_text(f"{number}/{total} {what}", style="dim", stderr=True)
+
+    result = demo(**given, report=report)
+    if watched:
+        print_text(f"done in {time.perf_counter() - began:.0f} s", style="dim", stderr=True)
+    if as_json:
+        print_json(result.to_dict())
+    else:
+        print_blocks(result.shown())
+
+
+@command(run=_run, results=_results)
 def demo(
-    out: str | Path = "gfimu-demo", *, seed: int = 1, report: Callable[[int, int, str], None] | None = None
-) -> DemoResult:
+    out: Annotated[
+        str | Path, Option("Folder to write; made where it is not there.", "DIR", kind=Path, writes=FOLDER)
+    ] = "gfimu-demo",
+    *,
+    seed: Annotated[int, SEED.also(least=0)] = 1,
+    report: Annotated[
+        Callable[[int, int, str], None] | None,
+        Option("Called before each step with its number from 1, how many there are, and what it does.", shell=False),
+    ] = None,
+) -> "DemoResult":
     """Run the paper's experiment in simulation: geometry, recording, estimate, drift, picture, diagnosis.
-
-    Parameters
-    ----------
-    out : str or Path
-        Folder to write to; made if it isn't there.
-    seed : int
-        Seed of all random numbers.
-    report : callable, optional
-        Called before each step with its number from 1, how many there are, and what it does.
 
     Raises
     ------
@@ -92,7 +82,7 @@ def demo(
     >>> gfimu.demo("gfimu-demo")  # doctest: +SKIP
     """
     require("gfimu demo", "mujoco", "rerun", "matplotlib")
-    from gfimu.commands.demo_steps import STEPS, Demo
+    from gfimu.commands.demo_steps import STEPS, Demo, DemoResult
 
     folder = Path(out)
     check_outputs([("out", folder, FOLDER)])  # the default too

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.base.declared import Declared, Written, figure, table
+from gfimu.base.results import TableResult, text_column
+
 if TYPE_CHECKING:
+    from gfimu.budget.drift.monte_carlo import DriftSample
     from gfimu.motion.estimate import Estimate
     from gfimu.motion.rest_bias import RestBias
-    from gfimu.position_drift.monte_carlo import DriftSample
     from gfimu.recording import Recording
     from sim.scenarios import Scenario
 
-__all__ = ["STEPS", "Demo", "Row"]
+__all__ = ["STEPS", "Demo", "DemoResult", "Row"]
 
 _SCENARIO = "paper_run"
 _TWIN = "cube12_turntable"
@@ -26,25 +29,83 @@ _MONTE_CARLO_RUNS = 200
 
 
 @dataclass(frozen=True)
-class Row:
-    """One line of the demo's table.
+class Row(Declared):
+    """One line of the demo's table; which figures it has depends on the line."""
 
-    Parameters
-    ----------
-    what : str
-        The question in the reader's words.
-    result : str
-        The answer with its unit.
-    beside : str
-        What to compare it with.
-    figures : mapping
-        The numbers behind it, for JSON, with units in the keys.
+    what: Annotated[str, figure("What was asked.", head="what")]
+    result: Annotated[str, figure("The answer with its unit.", head="result", in_json=False)]
+    beside: Annotated[str, figure("What to compare it with.", head="to compare", in_json=False)]
+    condition_number: Annotated[float | None, figure("Condition number κ(J) of the array.", absent=True)] = None
+    gdop: Annotated[float | None, figure("GDOP of the array.", absent=True)] = None
+    omega_squared_leakage: Annotated[
+        float | None, figure("Largest coefficient of a product of ω in the linear solution.", absent=True)
+    ] = None
+    samples: Annotated[int | None, figure("Samples of the recording.", absent=True)] = None
+    peak_rate_rad_s: Annotated[float | None, figure("Fastest rate of the run.", "rad/s", absent=True)] = None
+    largest_bias_m_s2: Annotated[float | None, figure("Largest bias read off at rest.", "m/s²", absent=True)] = None
+    rmse_m_s2: Annotated[float | None, figure("Error of p, rms.", "m/s²", absent=True)] = None
+    noise_std_m_s2: Annotated[float | None, figure("Error that the noise alone gives.", "m/s²", absent=True)] = None
+    rmse_rad_s2: Annotated[float | None, figure("Error of α, rms.", "rad/s²", absent=True)] = None
+    peak_rad_s2: Annotated[float | None, figure("Largest α of the run.", "rad/s²", absent=True)] = None
+    rmse_rad_s: Annotated[float | None, figure("Error of ω, rms.", "rad/s", absent=True)] = None
+    rmse_raw_rad_s: Annotated[
+        float | None, figure("Error of ω without the biases taken off, rms.", "rad/s", absent=True)
+    ] = None
+    expected_std_at_end_rad_s: Annotated[
+        float | None, figure("Standard deviation of ω that is expected at the end.", "rad/s", absent=True)
+    ] = None
+    error_rad: Annotated[float | None, figure("Error of the angle at the end.", "rad", absent=True)] = None
+    error_m: Annotated[float | None, figure("Error of the position at the end.", "m", absent=True)] = None
+    expected_m: Annotated[float | None, figure("Position error that is expected, 1 σ.", "m", absent=True)] = None
+    valid_until_s: Annotated[float | None, figure("Time until which the closed form holds.", "s", absent=True)] = None
+    alpha_before_deg_s2: Annotated[
+        float | None, figure("Apparent α at rest before the calibration.", "°/s²", absent=True)
+    ] = None
+    alpha_after_deg_s2: Annotated[float | None, figure("Apparent α at rest after it.", "°/s²", absent=True)] = None
+    rmse_before_rad_s: Annotated[
+        float | None, figure("Error of ω before the calibration, rms.", "rad/s", absent=True)
+    ] = None
+    rmse_after_rad_s: Annotated[float | None, figure("Error of ω after it, rms.", "rad/s", absent=True)] = None
+    drift_before_m: Annotated[float | None, figure("Position drift before the calibration.", "m", absent=True)] = None
+    drift_after_m: Annotated[float | None, figure("Position drift after it.", "m", absent=True)] = None
+    hidden: Annotated[float | None, figure("Size of the hidden effect, in its unit.", absent=True)] = None
+    found: Annotated[float | None, figure("Size that the diagnosis finds, in its unit.", absent=True)] = None
+    std: Annotated[float | None, figure("Standard deviation of the size found, in its unit.", absent=True)] = None
+    unit: Annotated[str | None, figure("Unit of these three.", absent=True)] = None
+    verdict: Annotated[str | None, figure("Verdict of the diagnosis.", absent=True)] = None
+
+
+@dataclass(frozen=True)
+class DemoResult(Declared, TableResult):
+    """The paper's experiment in simulation: the results of the demo, and the files that it wrote.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> gfimu.demo("gfimu-demo").rows  # doctest: +SKIP
     """
 
-    what: str
-    result: str
-    beside: str
-    figures: dict[str, Any]
+    seed: Annotated[int, figure("Seed of all random numbers.")]
+    rows: Annotated[tuple[Row, ...], figure("The table, line by line.", key="results")]
+    files: Annotated[Mapping[str, Path], figure("Files and folders that were written, by what they are.")]
+
+    def shown(self) -> Iterator[Any]:
+        """Yield the table, the files, and what to do with them."""
+        yield table(self._heading(), self.rows, "what result beside")
+        yield from (Written(what, path) for what, path in self.files.items())
+        yield f"look at it with: gfimu view {self.files['rerun recording']}"
+        yield f"and open {self.files['diagnosis report']} in a browser"
+
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """Return one row per question: the answer, and what to compare it with."""
+        keys = {"what": "what", "result": "result", "to_compare": "beside"}
+        return {name: text_column(getattr(row, key) for row in self.rows) for name, key in keys.items()}
+
+    def _heading(self) -> str:
+        return f"The paper's experiment in simulation (seed {self.seed})"
+
+    def _notes(self) -> tuple[str, ...]:
+        return tuple(f"{meaning}: {path}" for meaning, path in self.files.items())
 
 
 @dataclass
@@ -83,7 +144,7 @@ class Demo:
 
 def score_geometry(demo: Demo) -> None:
     """Score the array."""
-    from gfimu.geometry.scoring import score
+    from gfimu.array_search.scoring import score
 
     (cube,) = score("cube12")
     leakage = float(np.max(np.abs(cube.omega_squared_leakage)))
@@ -92,7 +153,9 @@ def score_geometry(demo: Demo) -> None:
             "geometry: condition number, GDOP",
             f"{cube.condition_number:.4f}, {cube.gdop:.4f}",
             "paper: 1.414, 1.061 (L/2 = 1)",
-            {"condition_number": cube.condition_number, "gdop": cube.gdop, "omega_squared_leakage": leakage},
+            condition_number=cube.condition_number,
+            gdop=cube.gdop,
+            omega_squared_leakage=leakage,
         )
     )
 
@@ -113,7 +176,9 @@ def simulate_run(demo: Demo) -> None:
             "simulated run",
             f"{demo.recording.duration:.0f} s × {len(demo.recording.channels)} channels",
             f"±{fastest:.0f} rad/s at {demo.recording.sample_rate:.0f} Hz; biases up to {largest:.2f} m/s²",
-            {"samples": len(demo.recording), "peak_rate_rad_s": fastest, "largest_bias_m_s2": largest},
+            samples=len(demo.recording),
+            peak_rate_rad_s=fastest,
+            largest_bias_m_s2=largest,
         )
     )
 
@@ -132,7 +197,8 @@ def read_biases(demo: Demo) -> None:
             "biases read at rest, rms error",
             f"{error:.3f} m/s²",
             f"{spread:.3f} by noise, the rest by gain and axis errors",
-            {"rmse_m_s2": error, "noise_std_m_s2": spread},
+            rmse_m_s2=error,
+            noise_std_m_s2=spread,
         )
     )
 
@@ -158,32 +224,31 @@ def estimate_motion(demo: Demo) -> None:
             "angular acceleration, rms error",
             f"{alpha:.3f} rad/s²",
             f"the table reaches {peak:.1f} rad/s²",
-            {"rmse_rad_s2": alpha, "peak_rad_s2": peak},
+            rmse_rad_s2=alpha,
+            peak_rad_s2=peak,
         ),
         Row(
             "angular rate, integrated, rms error",
             f"{_rms(omega):.3f} rad/s",
             f"{without:.0f} rad/s with biases left in",
-            {
-                "rmse_rad_s": _rms(omega),
-                "rmse_raw_rad_s": without,
-                "expected_std_at_end_rad_s": float(demo.estimate.omega_std[-1, 2]),
-            },
+            rmse_rad_s=_rms(omega),
+            rmse_raw_rad_s=without,
+            expected_std_at_end_rad_s=float(demo.estimate.omega_std[-1, 2]),
         ),
         Row(
             "table angle, error at the end",
             f"{angle:+.2f} rad",
             f"after {np.abs(np.diff(demo.recording.reference['angle_rad'])).sum() / (2 * np.pi):.0f} revolutions",
-            {"error_rad": angle},
+            error_rad=angle,
         ),
     ]
 
 
 def state_drift(demo: Demo) -> None:
     """State the position drift that was to be expected."""
-    from gfimu.parts.part import white_noise_std
-    from gfimu.position_drift import ErrorSources, drift_budget
-    from gfimu.position_drift.monte_carlo import monte_carlo_drift
+    from gfimu.array.parts.part import white_noise_std
+    from gfimu.budget.drift import ErrorSources, drift_budget
+    from gfimu.budget.drift.monte_carlo import monte_carlo_drift
 
     array, recording = demo.scenario.array, demo.recording
     noise = _rms(white_noise_std(array, recording.sample_rate))
@@ -202,13 +267,16 @@ def state_drift(demo: Demo) -> None:
             f"position drift after {_DRIFT_SECONDS:.0f} s",
             f"{np.hypot(*error[early, :2]):.1f} m",
             f"expected {closed:.1f} m; formula holds to {budget.valid_until:.1f} s",
-            {"error_m": float(np.hypot(*error[early, :2])), "expected_m": closed, "valid_until_s": budget.valid_until},
+            error_m=float(np.hypot(*error[early, :2])),
+            expected_m=closed,
+            valid_until_s=budget.valid_until,
         ),
         Row(
             f"position drift after {duration:.0f} s",
             f"{np.hypot(*error[-1, :2]):.0f} m",
             f"expected {final:.0f} m by Monte Carlo",
-            {"error_m": float(np.hypot(*error[-1, :2])), "expected_m": final},
+            error_m=float(np.hypot(*error[-1, :2])),
+            expected_m=final,
         ),
     ]
 
@@ -246,19 +314,22 @@ def calibrate_chips(demo: Demo) -> None:
             f"calibrated from {calibration.statistics['poses']:.0f} poses: α seen at rest",
             f"{alpha[1]:.1f} °/s²",
             f"{alpha[0]:.0f} °/s² before",
-            {"alpha_before_deg_s2": alpha[0], "alpha_after_deg_s2": alpha[1]},
+            alpha_before_deg_s2=alpha[0],
+            alpha_after_deg_s2=alpha[1],
         ),
         Row(
             "calibrated: angular rate, rms error",
             f"{omega[1]:.2f} rad/s",
             f"{omega[0]:.0f} rad/s before; no bias read at rest in either",
-            {"rmse_before_rad_s": omega[0], "rmse_after_rad_s": omega[1]},
+            rmse_before_rad_s=omega[0],
+            rmse_after_rad_s=omega[1],
         ),
         Row(
             f"calibrated: position drift after {_DRIFT_SECONDS:.0f} s",
             f"{drift[1]:.1f} m",
             f"{drift[0]:.0f} m before",
-            {"drift_before_m": drift[0], "drift_after_m": drift[1]},
+            drift_before_m=drift[0],
+            drift_after_m=drift[1],
         ),
     ]
 
@@ -322,7 +393,7 @@ def diagnose_hidden(demo: Demo) -> None:
         true = factor * float(np.hypot(*hidden[name].values()))
         cause = causes.get(name)
         if cause is None:
-            demo.rows.append(Row(what, "not found", f"hidden {true:.3f} {unit}", {"hidden": true, "found": None}))
+            demo.rows.append(Row(what, "not found", f"hidden {true:.3f} {unit}", hidden=true, found=None))
             continue
         size = factor * float(np.hypot(*cause.parameters.values()))
         std = factor * float(max(cause.std.values()))
@@ -331,7 +402,11 @@ def diagnose_hidden(demo: Demo) -> None:
                 what,
                 f"{size:.3f} ± {std:.3f} {unit}",
                 f"hidden {true:.3f} {unit}; verdict: {found.verdict.replace('_', ' ')}, {', '.join(causes)}",
-                {"hidden": true, "found": size, "std": std, "unit": unit, "verdict": found.verdict},
+                hidden=true,
+                found=size,
+                std=std,
+                unit=unit,
+                verdict=found.verdict,
             )
         )
 

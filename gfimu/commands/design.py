@@ -1,91 +1,83 @@
-"""Under `gfimu design`: the experiment that best separates effects."""
+"""Propose the table profile, or the mounting, that best separates effects.
 
-from __future__ import annotations
+Examples
+--------
+gfimu design tacho_scale sensor_position --twin cube12_turntable --max-rate 12 --out next.toml
+# The effects of an ambiguous verdict, with the recording at hand
+gfimu design --verdict diagnosis/verdict.json --run run.parquet --twin cube12_turntable --out next.toml
+"""
 
 import os
-from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-from gfimu.errors import InputError
-from gfimu.files.outputs import SCENARIO, writes
+from gfimu.base.errors import InputError
+from gfimu.base.files.outputs import SCENARIO
+from gfimu.commands.shell import completion
+from gfimu.commands.shell.declare import Option, command
+from gfimu.commands.shell.options import ALLOW_CODE, DURATION, MAP, MAX_MEMORY, PROGRESS, SEED, TWIN
 
 if TYPE_CHECKING:
-    import numpy as np
+    from collections.abc import Callable, Sequence
 
-    from gfimu.diagnosis.data.run import Run
-    from gfimu.diagnosis.design.profile_search import Limits
+    from gfimu.base.files.memory import MemorySize
     from gfimu.diagnosis.design.proposal import Proposal
-    from gfimu.importing import ColumnMap
+    from gfimu.model.world_model import Effect, WorldModel
+    from gfimu.recording.importing import ColumnMap
     from gfimu.recording.mapped import RecordingLike
-    from gfimu.world_model import Effect, WorldModel
 
 __all__ = ["design"]
 
 
-@writes(reads=("twin", "verdict", "run", "column_map"), out=SCENARIO)
-def design(
-    twin: WorldModel | str | Path,
-    effects: Sequence[str | Effect] = (),
-    *,
-    verdict: str | Path | None = None,
-    run: RecordingLike | Sequence[RecordingLike] = (),
-    column_map: ColumnMap | str | Path | None = None,
-    map_set: Sequence[str] = (),
-    max_rate: float = 15.0,
-    max_acceleration: float = 20.0,
-    duration: float = 60.0,
-    upright: bool = False,
-    evaluations: int = 150,
-    seed: int = 0,
-    out: str | Path | None = None,
-    limits: Limits | None = None,
-    rng: np.random.Generator | None = None,
-    mountings: Mapping[str, tuple[float, float, float]] | None = None,
-    recorded: Sequence[Run] = (),
-    sample_rate: float | None = None,
-    report: Callable[[float, str], None] | None = None,
-) -> Proposal:
-    """Propose the table profile, or the mounting, that best separates effects.
+def _results() -> tuple[type, ...]:
+    from gfimu.diagnosis.design.proposal import Proposal
 
-    Parameters
-    ----------
-    twin : WorldModel, str or Path
-        The simulation: a twin, its name or file, or one of one's own (``rig.py:function``).
-    effects : sequence of str or Effect
-        Effects to distinguish; or give ``verdict``.
-    verdict : str or Path, optional
-        Take the effects of an ambiguous verdict (``verdict.json``, or the folder that holds it).
-    run : Recording, path, or sequence of these
-        Recordings at hand, to be diagnosed together with the new one.
-    column_map : ColumnMap, str or Path, optional
-        What the columns of these are, where they are foreign files: a map, its name or TOML file (``--map``).
-    map_set : sequence of str
-        Keys of that map to set, such as ``"time.unit=ms"`` (``--map-set``); without a map they are all of it.
-    max_rate, max_acceleration : float
-        Largest rate, rad/s, and angular acceleration, rad/s², of the table.
-    duration : float
-        Length of the recording, s.
-    upright : bool
-        Never propose to mount the array differently.
-    evaluations : int
-        How many profiles to try.
-    seed : int
-        Seed of the search.
-    out : str or Path, optional
-        Scenario file of the experiment to write, ``.toml``.
-    limits : Limits, optional
-        In place of ``max_rate``, ``max_acceleration`` and ``duration``.
-    rng : numpy.random.Generator, optional
-        In place of ``seed``.
-    mountings : mapping, optional
-        How else the array may be mounted, in place of ``upright``; see `gfimu.diagnosis.design.design.MOUNTINGS`.
-    recorded : sequence of Run
-        Prepared recordings at hand, beside ``run``.
-    sample_rate : float, optional
-        Sample rate of the recording, Hz; the twin's by default.
-    report : callable, optional
-        Called with the share done, 0 to 1, and a line of text.
+    return (Proposal,)
+
+
+@command(results=_results, doing="designing")
+def design(
+    twin: Annotated["WorldModel | str | Path", TWIN],
+    effects: Annotated[
+        "Sequence[str | Effect]",
+        Option(
+            "Effects to distinguish; or use --verdict.",
+            "[EFFECT]...",
+            kind=list[str],
+            argument=True,
+            offers=completion.effects,
+        ),
+    ] = (),
+    *,
+    verdict: Annotated[
+        "str | Path | None",
+        Option("Take the effects of an ambiguous verdict (verdict.json).", "FILE", kind=Path, reads=True),
+    ] = None,
+    run: Annotated[
+        "RecordingLike | Sequence[RecordingLike]",
+        Option(
+            "Recording at hand, to be diagnosed together with the new one; may be repeated.",
+            "RUN",
+            kind=list[Path],
+            reads=True,
+        ),
+    ] = (),
+    allow_code: Annotated[bool, ALLOW_CODE] = False,
+    column_map: Annotated["ColumnMap | str | Path | None", MAP] = None,
+    max_memory: Annotated["MemorySize | None", MAX_MEMORY] = None,
+    max_rate: Annotated[float, Option("Largest rate of the table, rad/s.", "RAD/S")] = 15.0,
+    max_acceleration: Annotated[float, Option("Largest angular acceleration of the table, rad/s².", "RAD/S²")] = 20.0,
+    duration: Annotated[float, DURATION] = 60.0,
+    upright: Annotated[bool, Option("Never propose to mount the array differently.")] = False,
+    evaluations: Annotated[int, Option("How many profiles to try.", "N", least=1)] = 150,
+    seed: Annotated[int, SEED] = 0,
+    out: Annotated[
+        "str | Path | None",
+        Option("Scenario to write (.toml): the experiment.", "FILE", kind=Path, writes=SCENARIO, what="scenario"),
+    ] = None,
+    progress: Annotated["Callable[[float, str], None] | None", PROGRESS] = None,
+) -> "Proposal":
+    """Propose the table profile, or the mounting, that best separates effects.
 
     Raises
     ------
@@ -100,18 +92,18 @@ def design(
     """
     import numpy as np
 
+    from gfimu.base.files.atomic_file import write_text
     from gfimu.commands.opened import as_runs, as_source, as_twin
     from gfimu.diagnosis.data.run import prepare_run
     from gfimu.diagnosis.design.ambiguity import open_effects
     from gfimu.diagnosis.design.design import MOUNTINGS, Limits
     from gfimu.diagnosis.design.design import design as propose
-    from gfimu.files.atomic_file import write_text
     from gfimu.recording import Recording
     from gfimu.recording.formats import open_recording
 
     if (verdict is None) == (not effects):
         raise InputError("name effects to distinguish, or give --verdict: one of the two")
-    model = as_twin(twin)
+    model = as_twin(twin, allow_code=allow_code)
     asked = list(effects) if verdict is None else open_effects(verdict, model)
     at_hand = [
         prepare_run(
@@ -120,19 +112,19 @@ def design(
             name=str(item) if isinstance(item, str | os.PathLike) else f"run {number}",
         )
         for number, item in enumerate(
-            (as_source(one, model.array, column_map, map_set) for one in as_runs(run)), start=1
+            (as_source(one, model.array, column_map, max_memory=max_memory) for one in as_runs(run)), start=1
         )
     ]
     proposal = propose(
         model,
         asked,
-        limits=limits or Limits(max_rate, max_acceleration, duration),
-        rng=np.random.default_rng(seed) if rng is None else rng,
-        mountings={} if upright else MOUNTINGS if mountings is None else mountings,
-        recorded=[*recorded, *at_hand],
-        sample_rate=sample_rate or float(getattr(model, "sample_rate", 100.0)),
+        limits=Limits(max_rate, max_acceleration, duration),
+        rng=np.random.default_rng(seed),
+        mountings={} if upright else MOUNTINGS,
+        recorded=at_hand,
+        sample_rate=float(getattr(model, "sample_rate", 100.0)),
         evaluations=evaluations,
-        report=report,
+        report=progress,
     )
     if out is not None:
         write_text(out, proposal.to_toml())

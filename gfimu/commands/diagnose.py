@@ -1,34 +1,63 @@
-"""Under `gfimu diagnose`: what the simulation gets wrong against recordings, and why."""
+"""Compare recordings with a simulation: name the causes of the difference, extend the simulation, measure the gain.
 
-from __future__ import annotations
+Writes the verdict, the extended twin, a report for people and a rerun recording to a folder. The exit code is 0
+whatever the verdict. At the time limit the result is what is known by then; at Ctrl-C and SIGTERM too, with the
+exit codes 130 and 143.
+
+Examples
+--------
+gfimu diagnose run.parquet --twin cube12_turntable --out diagnosis
+# What the recording can show, first
+gfimu diagnose run.parquet --twin cube12_turntable --check
+# A rig known to be unusual
+gfimu diagnose run.parquet --twin cube12_turntable --grammar --out diagnosis
+# Two loggers with two clocks
+gfimu diagnose accel.csv --map mine.toml --reference tacho.csv --twin rig.toml --out diagnosis
+# A unit fresh from the bench
+gfimu diagnose run.parquet --twin cube12_turntable --calibration cal.json --out diagnosis
+"""
 
 import os
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+import time
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
-
-from gfimu.errors import InputError
-from gfimu.files.outputs import OutputFolder, same_file, writes
-from gfimu.optional_packages import missing
+from gfimu.base.errors import InputError
+from gfimu.base.files.outputs import OutputFolder, check_outputs, same_file
+from gfimu.base.optional_packages import missing
+from gfimu.commands.shell.declare import Option, command, command_of
+from gfimu.commands.shell.options import (
+    ALLOW_CODE,
+    CALIBRATION,
+    FORCE,
+    MAP,
+    MAX_MEMORY,
+    PROGRESS,
+    RECORDINGS,
+    REFERENCE_MAP,
+    TIME_LIMIT,
+    TWIN,
+)
 
 if TYPE_CHECKING:
+    from gfimu.base.files.memory import MemorySize
     from gfimu.calibration.result import Calibration
     from gfimu.commands.opened import Source
     from gfimu.diagnosis.report.rig import DrawnRig
     from gfimu.diagnosis.verdict.verdict import Diagnosis
-    from gfimu.importing import ColumnMap
-    from gfimu.joining import Joined
+    from gfimu.model.world_model import WorldModel
     from gfimu.recording import Recording
+    from gfimu.recording.importing import ColumnMap
+    from gfimu.recording.joining import Joined, ReferenceSeries
     from gfimu.recording.mapped import RecordingLike
     from gfimu.visual.scene import Shape
-    from gfimu.world_model import WorldModel
     from sim.twin import Twin
     from sim.world import World
 
-__all__ = ["FOLDER", "diagnose", "write_report", "written_files"]
+__all__ = ["FOLDER", "diagnose", "write_report"]
 
 EXPLAINED = frozenset({"sign", "exchange", "dead", "rest_bias"})
 """Findings of a recording's checks that are effects of the library: the diagnosis explains them."""
@@ -36,61 +65,140 @@ EXPLAINED = frozenset({"sign", "exchange", "dead", "rest_bias"})
 FOLDER = OutputFolder(("verdict.json", "twin.toml", "report.html", "diagnosis.rrd", "array.toml"))
 """What the folder of a diagnosis holds."""
 
+_TIME_LIMIT_S = 600.0
+"""Time that a diagnosis may take by default, s. By choice: most take a minute."""
 
-@writes(reads=("recordings", "twin", "held_out", "calibration", "column_map", "reference", "reference_map"), out=FOLDER)
-def diagnose(
-    recordings: RecordingLike | Sequence[RecordingLike],
-    twin: WorldModel | str | Path,
+
+def _results() -> tuple[type, ...]:
+    from gfimu.diagnosis.design.run_check import RunCheck
+    from gfimu.diagnosis.verdict.verdict import Diagnosis
+
+    return Diagnosis, RunCheck
+
+
+@dataclass(frozen=True)
+class _Report:
+    """What the shell prints: what the recordings show, and the diagnosis."""
+
+    found: "Diagnosis"
+    given: Mapping[str, Any]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the diagnosis as JSON holds it."""
+        return self.found.to_dict()
+
+    def shown(self) -> Iterator[Any]:
+        """Yield tables and sentences."""
+        from gfimu.base.declared import Line
+        from gfimu.diagnosis.report.plain_words import headline
+        from gfimu.diagnosis.report.tables import diagnosis_tables
+
+        yield from () if self.found.interrupted else self._recordings()
+        yield Line(headline(self.found), style="bold")
+        yield from diagnosis_tables(self.found)
+
+    def _recordings(self) -> list[str]:
+        """Return what the recordings show; nothing where the check refuses them, which the diagnosis reports."""
+        from gfimu.commands.check import check
+        from gfimu.commands.shell.output import progress
+
+        looked_at = command_of(check)
+        with progress("looking at the recordings"), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            try:
+                return list(check(**looked_at.taken(self.given)).in_short())
+            except InputError:
+                return []
+
+    def exit_code(self) -> int:
+        """Return the exit code, and say on standard error what ended the diagnosis early."""
+        from gfimu.commands.shell.output import print_text
+        from gfimu.commands.shell.stop_signals import INTERRUPTED, TERMINATED
+        from gfimu.diagnosis.time_limit import TIME_LIMIT as OUT_OF_TIME
+
+        end = self.found.interrupted
+        if end is None:
+            return 0
+        print_text(f"gfimu: ended by {end.by} ({end.stage}); the result is what was known", stderr=True)
+        return {OUT_OF_TIME: 0, "SIGTERM": TERMINATED}.get(end.by, INTERRUPTED)
+
+
+def _run(
+    given: dict[str, Any],
+    as_json: bool,
     *,
-    out: str | Path | None = None,
-    held_out: RecordingLike | Sequence[RecordingLike] = (),
-    calibration: Calibration | str | Path | None = None,
-    column_map: ColumnMap | str | Path | None = None,
-    map_set: Sequence[str] = (),
-    reference: str | Path | None = None,
-    reference_map: ColumnMap | str | Path | None = None,
-    reference_map_set: Sequence[str] = (),
-    names: Sequence[str] | None = None,
-    report: Callable[[float, str], None] | None = None,
-    grammar: bool = False,
-    force: bool = False,
-) -> Diagnosis:
+    check: Annotated[bool, Option("Only look at the recordings, as `gfimu check`: no diagnosis, no --out.")] = False,
+) -> None:
+    from gfimu.commands.shell.printing import print_report
+
+    declared = command_of(diagnose)
+    if check:
+        from gfimu.commands.check import check as look
+
+        declared = command_of(look)
+    elif given["out"] is None:
+        raise InputError("--out is missing: the folder for the diagnosis; --check needs none")
+    print_report(declared, declared.taken(given), as_json=as_json)
+
+
+@command(
+    results=_results,
+    doing="diagnosing",
+    report=_Report,
+    run=_run,
+    files=lambda found, given: _written_files(found, given["out"]),
+    exit_code=_Report.exit_code,
+)
+def diagnose(
+    recordings: Annotated["RecordingLike | Sequence[RecordingLike]", RECORDINGS.also("; fitted together")],
+    twin: Annotated["WorldModel | str | Path", TWIN],
+    *,
+    out: Annotated[
+        "str | Path | None",
+        Option(
+            "Folder to write: verdict.json, twin.toml with its array, report.html, diagnosis.rrd.",
+            "FILE",
+            kind=Path,
+            writes=FOLDER,
+        ),
+    ] = None,
+    held_out: Annotated[
+        "RecordingLike | Sequence[RecordingLike]",
+        Option("Recording kept for measuring the gain; may be repeated.", "RUN", kind=list[Path], reads=True),
+    ] = (),
+    calibration: Annotated["Calibration | str | Path | None", CALIBRATION] = None,
+    grammar: Annotated[
+        bool, Option("Search the wider library of effects at once, not only where the usual one fails.")
+    ] = False,
+    force: Annotated[bool, FORCE] = False,
+    allow_code: Annotated[bool, ALLOW_CODE] = False,
+    time_limit: Annotated[
+        float, TIME_LIMIT.also(". What is known by then is the result, and described so")
+    ] = _TIME_LIMIT_S,
+    column_map: Annotated["ColumnMap | str | Path | None", MAP] = None,
+    max_memory: Annotated["MemorySize | None", MAX_MEMORY] = None,
+    reference: Annotated[
+        "ReferenceSeries | str | Path | None",
+        Option(
+            "Reference of the first run on a clock of its own; aligned as by `gfimu join`.",
+            "FILE",
+            kind=Path,
+            reads=True,
+        ),
+    ] = None,
+    reference_map: Annotated["ColumnMap | str | Path | None", REFERENCE_MAP] = None,
+    names: Annotated[
+        "Sequence[str] | None", Option("Names of the runs, for people; those of their files by default.", shell=False)
+    ] = None,
+    progress: Annotated["Callable[[float, str], None] | None", PROGRESS] = None,
+) -> "Diagnosis":
     """Compare recordings with a simulation: name the causes of the difference, extend the simulation, measure the gain.
 
-    Parameters
-    ----------
-    recordings : Recording, path, table, (times, readings), or sequence of these
-        Runs of one rig, fitted together.
-    twin : WorldModel, str or Path
-        The simulation to check: a twin, its name or file; or a simulation of one's own, as such or as
-        ``rig.py:function`` (`gfimu.own_rig.load_model`).
-    out : str or Path, optional
-        Folder for ``verdict.json``, ``twin.toml``, ``report.html`` and ``diagnosis.rrd``, and ``array.toml`` where the
-        twin's array is no shipped one; made if it isn't there. A file whose package is not installed is left out, with
-        a warning before the work begins.
-    held_out : as recordings
-        Recordings kept for measuring the gain.
-    calibration : Calibration, str or Path, optional
-        Calibration of the unit, applied first.
-    column_map : ColumnMap, str or Path, optional
-        What the columns of a foreign file are: a map, its name or TOML file (``--map``); see `gfimu.inspect`.
-    map_set : sequence of str
-        Keys of that map to set, such as ``"time.unit=ms"`` (``--map-set``); without a map they are all of it.
-    reference : str or Path, optional
-        Reference of the first run on a clock of its own; it is aligned first, as by `gfimu.join`.
-    reference_map : ColumnMap, str or Path, optional
-        What the columns of that file are.
-    reference_map_set : sequence of str
-        Keys of that map to set.
-    names : sequence of str, optional
-        Names of the runs, for people; those of their files by default.
-    report : callable, optional
-        Called with the share done, 0 to 1, and a line of text.
-    grammar : bool
-        Whether further effects of a rig, and places times dependences without a name of their own, are searched at
-        once, as a twin file with ``grammar = true`` asks for, and not only where the usual effects give no good answer.
-    force : bool
-        Go on, with a warning, where the checks of a recording would refuse it.
+    The simulation may be one of your own, as such or as ``rig.py:function`` (`gfimu.model.own_rig.load_model`).
+
+    The folder holds ``array.toml`` too where the twin's array is no shipped one. A file whose package is not installed
+    is left out, with a warning before the work begins. A diagnosis that the time limit (infinite: none) or Ctrl-C ends
+    says in its ``interrupted`` what was done and what was not; writing the files takes longer.
 
     Returns
     -------
@@ -101,7 +209,7 @@ def diagnose(
     ------
     InputError
         If a recording is too short, lacks the reference that drives the twin, is refused by its checks, or is held
-        out and fitted both; or the folder can't be written.
+        out and fitted both; the time limit is not positive; or the folder can't be written.
 
     Examples
     --------
@@ -112,16 +220,21 @@ def diagnose(
     >>> found.plot()  # doctest: +SKIP
     """
     from gfimu.commands.opened import as_calibration, as_runs, as_source, as_twin
-    from gfimu.joining import displaced_reference
+    from gfimu.diagnosis.time_limit import limited_to
     from gfimu.recording.checks import examine
+    from gfimu.recording.joining import displaced_reference
 
+    if not time_limit > 0.0:
+        raise InputError(f"the time limit is {time_limit:g} s; it must be above zero (--time-limit SECONDS)")
+    began = time.monotonic()
     if out is not None:
         from gfimu.diagnosis.report.folder import warn_of_omitted
 
         warn_of_omitted()
-    given = as_twin(twin)
+    given = as_twin(twin, allow_code=allow_code)
     runs, unseen = (
-        [as_source(run, given.array, column_map, map_set) for run in as_runs(group)] for group in (recordings, held_out)
+        [as_source(run, given.array, column_map, max_memory=max_memory) for run in as_runs(group)]
+        for group in (recordings, held_out)
     )
     _refuse_fitted(runs, unseen)
     model = given.searching(wide=True) if grammar else given
@@ -137,37 +250,39 @@ def diagnose(
     if reference is not None:
         from gfimu.commands.join import join
 
-        clocks[0] = join(read[0], reference, reference_map=reference_map, reference_map_set=reference_map_set)
-    found, used = _explained(read, clocks, model, reference is not None, kept, labels, report, force)
+        clocks[0] = join(read[0], reference, reference_map=reference_map, max_memory=max_memory)
+    with limited_to(time_limit - (time.monotonic() - began)):
+        found, used = _explained(read, clocks, model, reference is not None, kept, labels, progress, force)
     if used.mounting_rotvec.any():
         x, y, z = used.mounting_rotvec.tolist()
         found = replace(found, mounting_rotvec_rad=(x, y, z))
     if out is not None:
-        if report is not None:
-            report(0.99, "write the report")
+        if progress is not None:
+            progress(0.99, "write the report")
         write_report(found, out)
     return found
 
 
 def _explained(
-    read: Sequence[Recording],
-    clocks: Sequence[Joined | None],
-    model: WorldModel,
+    read: "Sequence[Recording]",
+    clocks: "Sequence[Joined | None]",
+    model: "WorldModel",
     two_files: bool,
-    kept: Sequence[Recording],
+    kept: "Sequence[Recording]",
     labels: Sequence[str],
-    report: Callable[[float, str], None] | None,
+    progress: Callable[[float, str], None] | None,
     force: bool,
-) -> tuple[Diagnosis, Recording]:
+) -> "tuple[Diagnosis, Recording]":
     """Return the diagnosis of recordings whose references are aligned where they had another clock, and the first run.
 
     The rate error of a clock is left in, so that it is diagnosed beside all else. Where the alignment shows one and the
     diagnosis doesn't name it, or the model is of a free body, which has no such effect, it is taken off.
     """
     from gfimu.diagnosis.diagnose import diagnose as explain
+    from gfimu.diagnosis.verdict.parts import ReferenceClock
     from gfimu.diagnosis.verdict.sample_notes import with_reference_clock
 
-    def runs(own_rate: bool) -> list[Recording]:
+    def runs(own_rate: bool) -> "list[Recording]":
         return [
             run if one is None else (one.by_own_rate if own_rate else one.by_reference_clock)
             for run, one in zip(read, clocks, strict=True)
@@ -175,20 +290,21 @@ def _explained(
 
     first = next((one for one in clocks if one is not None), None)
     used = runs(model.drive_source != "gyro")
-    found = explain(used, model, held_out=kept, names=labels, report=report, force=force)
-    if first is None:
+    found = explain(used, model, held_out=kept, names=labels, report=progress, force=force)
+    if first is None or found.interrupted:
         return found, used[0]
     corrected = ["tacho_latency"] if first.is_far and not two_files else []
     if first.has_rate_error and "clock_error" not in {cause.effect for cause in found.causes}:
         corrected.append("clock_error")
         if model.drive_source != "gyro":
-            used = runs(False)
-            found = explain(used, model, held_out=kept, names=labels, report=report, force=force)
-    return with_reference_clock(found, first.clock, corrected, model), used[0]
+            again = explain(runs(False), model, held_out=kept, names=labels, report=progress, force=force)
+            if again.interrupted:  # what is known is the verdict with the clock's error left in
+                return replace(found, interrupted=again.interrupted), used[0]
+            used, found = runs(False), again
+    return with_reference_clock(found, ReferenceClock(**first.clock), corrected, model), used[0]
 
 
-@writes(folder=FOLDER)
-def write_report(diagnosis: Diagnosis, folder: str | Path) -> Path:
+def write_report(diagnosis: "Diagnosis", folder: str | Path) -> Path:
     """Write the folder of a diagnosis: verdict, extended twin, ``report.html`` and a rerun recording.
 
     The rig of an extended `sim.twin.Twin` is drawn by its MuJoCo model where mujoco and rerun-sdk are installed.
@@ -217,12 +333,13 @@ def write_report(diagnosis: Diagnosis, folder: str | Path) -> Path:
     """
     from gfimu.diagnosis.report.folder import write_diagnosis
 
+    check_outputs([("folder", folder, FOLDER)])
     text, more = _twin_files(diagnosis)
     written = write_diagnosis(folder, diagnosis, twin_toml=text, more=more, rig=drawn_rig(diagnosis))
     return written.get("report", written["verdict"])
 
 
-def written_files(diagnosis: Diagnosis, folder: str | Path) -> dict[str, Path]:
+def _written_files(diagnosis: "Diagnosis", folder: str | Path) -> dict[str, Path]:
     """Return the files that `write_report` writes to a folder, by what they are called."""
     from gfimu.diagnosis.report.folder import files_of
 
@@ -230,11 +347,11 @@ def written_files(diagnosis: Diagnosis, folder: str | Path) -> dict[str, Path]:
     return {meaning: Path(folder) / name for name, meaning in names.items()}
 
 
-def _twin_files(diagnosis: Diagnosis) -> tuple[str, dict[str, str]]:
+def _twin_files(diagnosis: "Diagnosis") -> tuple[str, dict[str, str]]:
     """Return the text of the extended twin's file, and the texts of files that it names, by file name."""
     import tomli_w
 
-    from gfimu.files.model_files import list_models
+    from gfimu.base.files.model_files import list_models
     from sim.twin import Twin
 
     twin = diagnosis.twin
@@ -248,8 +365,10 @@ def _twin_files(diagnosis: Diagnosis) -> tuple[str, dict[str, str]]:
     return tomli_w.dumps(content), more
 
 
-def drawn_rig(diagnosis: Diagnosis) -> DrawnRig | None:
+def drawn_rig(diagnosis: "Diagnosis") -> "DrawnRig | None":
     """Return how the array of a diagnosis stood on its rig, for pictures; None for a simulation of one's own."""
+    import numpy as np
+
     from gfimu.diagnosis.report.rig import DrawnRig
     from sim.twin import Twin
 
@@ -261,7 +380,7 @@ def drawn_rig(diagnosis: Diagnosis) -> DrawnRig | None:
     return DrawnRig(world.mount_rotvec, world.cube_offset, _shapes(twin, world), world.slide, lean)
 
 
-def _shapes(twin: Twin, world: World) -> Mapping[str, Sequence[Shape]] | None:
+def _shapes(twin: "Twin", world: "World") -> "Mapping[str, Sequence[Shape]] | None":
     """Return the shapes of the rig; None where it has none of its own, or is not drawn here."""
     on_table = world.slide is None and world.leaning_axis() is None
     if twin.drive_source == "gyro" or not on_table or missing("mujoco", "rerun"):
@@ -283,12 +402,12 @@ def _refuse_fitted(fitted: Sequence[object], held_out: Sequence[object]) -> None
                 raise InputError(f"{name}: is fitted and held out; hold out a recording that is not fitted")
 
 
-def _by_tacho(recording: Recording) -> bool:
+def _by_tacho(recording: "Recording") -> bool:
     """Return whether a free body's rate is that of a tachometer along its axle, and not of a gyro on the body."""
     return "tacho_rad_s" in recording.reference and "gyro_x_rad_s" not in recording.reference
 
 
-def _opened(recording: Source, model: WorldModel, unit: Calibration | None) -> Recording:
+def _opened(recording: "Source", model: "WorldModel", unit: "Calibration | None") -> "Recording":
     """Return a recording with the channels of the twin's array, calibrated where there is a calibration."""
     from gfimu.calibration.run_file import open_calibrated_run
     from gfimu.recording import Recording
@@ -301,7 +420,7 @@ def _opened(recording: Source, model: WorldModel, unit: Calibration | None) -> R
     return open_calibrated_run(recording, unit, model.array)[0]
 
 
-def _names(runs: Sequence[Source]) -> list[str]:
+def _names(runs: "Sequence[Source]") -> list[str]:
     """Return names for people: file names where they distinguish the runs."""
     paths = [Path(run) if isinstance(run, str | os.PathLike) else None for run in runs]
     short = [path.name if path is not None else f"run {number}" for number, path in enumerate(paths, start=1)]

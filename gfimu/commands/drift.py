@@ -1,213 +1,190 @@
-"""Under `gfimu drift`: the position-drift budget of an array, or the drift about a known axis."""
+"""Position-drift budget of an array in closed form, with a Monte Carlo; the drift of a recording at rest.
 
-from __future__ import annotations
+Examples
+--------
+gfimu drift --array cube12 --duration 0.3 --bias-mg 35 --noise-ug 290 --monte-carlo 400
+# The paper's inversion
+gfimu drift --from-position 6.42 0 0 --known-bias-mg 1 0 0 --latitude 35.7
+# Of a recording at rest
+gfimu drift run.parquet --duration 30 --picture drift.png
+# One chip on a table
+gfimu drift --array one_chip --axis z --speed-rad-s 6 --duration 60 --bias-mg 5 --noise-ug 290
+"""
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from gfimu.commands.former_arguments import former_arguments
-from gfimu.errors import InputError
-from gfimu.results import Panel, PlottedResult, Series
+from gfimu.base.errors import InputError
+from gfimu.commands.known_axis import AXIS_ALONE, AxisLike, KnownAxis, as_known_axis
+from gfimu.commands.opened import as_array
+from gfimu.commands.shell.declare import Command, Option, command
+from gfimu.commands.shell.options import (
+    ARRAY,
+    BIAS_MG,
+    CALIBRATION,
+    DURATION,
+    FORCE,
+    GRAVITY,
+    LATITUDE,
+    MAP,
+    MAX_MEMORY,
+    NOISE_UG,
+    PICTURE,
+    PROGRESS,
+    SEED,
+    SPEED_RAD_S,
+)
 
 if TYPE_CHECKING:
-    from gfimu.geometry.array import AccelerometerArray
-    from gfimu.geometry.turning_axis import TurningAxis
-    from gfimu.known_axis.accuracy.drift import AxisDrift
-    from gfimu.position_drift import DriftBudget, ErrorSources
-    from gfimu.position_drift.monte_carlo import DriftSample
+    from gfimu.array.array import AccelerometerArray
+    from gfimu.base.files.memory import MemorySize
+    from gfimu.budget.drift import ErrorSources
+    from gfimu.budget.drift.equivalent import EquivalentErrors
+    from gfimu.budget.drift.rest_windows import RestDrift
+    from gfimu.budget.drift.result import Drift
+    from gfimu.calibration.result import Calibration
+    from gfimu.rate.axis.accuracy.drift import AxisDrift
+    from gfimu.recording.importing import ColumnMap
+    from gfimu.recording.mapped import RecordingLike
 
-__all__ = ["Drift", "axis_drift", "drift"]
+__all__ = ["axis_drift", "drift", "drift_from_position", "drift_of_rest"]
 
-
-@dataclass(frozen=True)
-class Drift(PlottedResult):
-    """Position drift: the budget in closed form, and the Monte Carlo where one was run.
-
-    Parameters
-    ----------
-    budget : DriftBudget
-        Position error, cause by cause.
-    sample : DriftSample or None
-        Nonlinear Monte Carlo of the same errors.
-    seed : int
-        Its seed.
-
-    Examples
-    --------
-    >>> import gfimu
-    >>> gfimu.drift("cube12", time=10.0, noise_ug=290.0).budget.total_std.round(1)
-    array([27.8, 27.8,  3.3])
-    """
-
-    budget: DriftBudget
-    sample: DriftSample | None
-    seed: int
-
-    def to_columns(self) -> dict[str, NDArray[Any]]:
-        """Return the columns of the budget, one row per cause."""
-        return self.budget.to_columns()
-
-    def _heading(self) -> str:
-        return self.budget._heading()
-
-    def _facts(self) -> list[tuple[str, str]]:
-        facts = self.budget._facts()
-        if self.sample is not None:
-            std = ", ".join(f"{one:.3g}" for one in self.sample.std[-1])
-            relative = 100.0 * self.sample.relative_sampling_error
-            facts.append((f"Monte Carlo, {self.sample.runs} runs", f"({std}) m, each ± {relative:.2g} %"))
-        return facts
-
-    def _notes(self) -> tuple[str, ...]:
-        return self.budget._notes()
-
-    def _panels(self) -> list[Panel]:
-        panels = self.budget._panels()
-        if self.sample is not None:
-            found = self.sample
-            series = tuple(
-                Series(axis, found.std[:, place], found.std[:, place] * found.relative_sampling_error, role=axis)
-                for place, axis in enumerate("xyz")
-            )
-            title = f"position error of {found.runs} simulated runs"
-            panels.append(Panel(title, "σ, m", series, found.t_s, "time, s", scale="zero"))
-        return panels
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the content of ``gfimu drift --json``."""
-        result: dict[str, Any] = self.budget.to_dict()
-        if self.sample is not None:
-            result["monte_carlo"] = {
-                "runs": self.sample.runs,
-                "seed": self.seed,
-                "std_m": self.sample.std[-1],
-                "mean_m": self.sample.mean[-1],
-                "relative_sampling_error": self.sample.relative_sampling_error,
-            }
-        return result
+_USUAL = "cube12"
+_ARRAY = ARRAY.also(f"; else the recording's own, or {_USUAL} without a recording")
+_TIME = DURATION.also(", from the start of navigation")
+_WALK = Option("Random walk of each channel's bias, µg/√s.")
+_SPEED = SPEED_RAD_S.also(", of the table about the vertical or the known axis; 0 is at rest")
+_OF_RECORDINGS = {"lead", "calibration", "picture", "column_map", "force"}
+_OF_POSITIONS = {"known_bias_mg", "latitude"}
+_OF_FREE_BODIES = {"rate_drift_deg_h", "offset", "monte_carlo"}
 
 
-@former_arguments(time="duration", rate="speed_rad_s")
-def drift(
-    array: AccelerometerArray | str | Path = "cube12",
+def _rest_results() -> tuple[type, ...]:
+    from gfimu.budget.drift.rest_windows import RestDrift
+
+    return (RestDrift,)
+
+
+@command(results=_rest_results, doing="navigating through the rests")
+def drift_of_rest(
+    recording: Annotated[
+        "RecordingLike",
+        Option(
+            "Recording with long rests: the drift that it has, beside what its noise predicts.",
+            "[RUN]",
+            kind=Path,
+            argument=True,
+            reads=True,
+        ),
+    ],
+    array: Annotated["AccelerometerArray | str | Path | None", _ARRAY] = None,
     *,
-    duration: float = 30.0,
-    bias_mg: float = 0.0,
-    noise_ug: float = 0.0,
-    walk_ug: float = 0.0,
-    rate_drift_deg_h: float = 0.0,
-    speed_rad_s: float = 0.0,
-    offset: tuple[float, float] = (0.0, 0.0),
-    gravity: float = 9.80665,
-    monte_carlo: int = 0,
-    seed: int = 0,
-    progress: Callable[[int], None] | None = None,
-) -> Drift:
-    """Budget the position drift of an array; about a known axis see `axis_drift`.
-
-    Parameters
-    ----------
-    array : AccelerometerArray, str or Path
-        The array, its name or file.
-    duration : float
-        Time since the start of navigation, s.
-    bias_mg, noise_ug, walk_ug : float
-        Per channel: standard deviation of the constant bias, mg; one-sided density of the white noise, µg/√Hz; random
-        walk of the bias, µg/√s.
-    rate_drift_deg_h : float
-        Constant error of the angular rate per axis, °/h.
-    speed_rad_s : float
-        Rate of the table about the vertical, rad/s; 0 is at rest.
-    offset : tuple of float
-        Horizontal place of the unit off the axis, m.
-    gravity : float
-        Local gravity, m/s².
-    monte_carlo : int
-        Number of nonlinear Monte Carlo runs; 0 for none.
-    seed : int
-        Seed of the Monte Carlo.
-    progress : callable, optional
-        Called with the number of Monte Carlo runs done.
+    duration: Annotated[float, _TIME] = 30.0,
+    lead: Annotated[
+        float, Option("With RUN: rest before each window, from which tilt and biases are read off, s.")
+    ] = 10.0,
+    gravity: Annotated[float, GRAVITY] = 9.80665,
+    calibration: Annotated["Calibration | str | Path | None", CALIBRATION.also(when="With RUN: ")] = None,
+    picture: Annotated[str | Path | None, PICTURE.also(when="With RUN: ")] = None,
+    column_map: Annotated["ColumnMap | str | Path | None", MAP] = None,
+    max_memory: Annotated["MemorySize | None", MAX_MEMORY] = None,
+    force: Annotated[bool, FORCE] = False,
+) -> "RestDrift":
+    """Navigate through the rests of a recording, and compare the errors with the prediction from its noise.
 
     Raises
     ------
     InputError
-        If there is no error to budget, or an argument is out of range.
+        If no rest is long enough, the recording is refused by its checks, or the picture can't be written.
     GeometryError
         If the array can't see all six motions.
 
     Examples
     --------
     >>> import gfimu
-    >>> found = gfimu.drift("cube12", time=10.0, noise_ug=290.0)
-    >>> print(f"{found.budget.total_std[0]:.1f} m")
-    27.8 m
+    >>> rest = gfimu.simulate("rest", seed=3, changes=["duration_s=30"])
+    >>> found = gfimu.drift_of_rest(rest, duration=2.0)
+    >>> len(found.start_s) > 1
+    True
     """
-    from gfimu.commands.opened import as_array
-    from gfimu.position_drift import drift_budget
-    from gfimu.position_drift.monte_carlo import monte_carlo_drift
+    from gfimu.base.errors import naming
+    from gfimu.budget.drift.rest_windows import rest_drift
+    from gfimu.commands.opened import as_calibrated_run, as_source, name_of
+    from gfimu.recording.checks import examine
 
-    if monte_carlo == 1 or monte_carlo < 0:
-        raise InputError(f"--monte-carlo {monte_carlo}: give 0 for none, or 2 or more runs")
-    sources = _sources(bias_mg, noise_ug, walk_ug, rate_drift_deg_h)
-    geometry = as_array(array)
-    budget = drift_budget(geometry, duration, sources, rate=speed_rad_s, offset=offset, gravity=gravity)
-    sample = None
-    if monte_carlo:
-        sample = monte_carlo_drift(
-            geometry,
-            duration,
-            sources,
-            runs=monte_carlo,
-            rng=np.random.default_rng(seed),
-            rate=speed_rad_s,
-            offset=offset,
-            gravity=gravity,
-            progress=progress,
-        )
-    return Drift(budget, sample, seed)
+    source = as_source(recording, array, column_map, max_memory=max_memory)
+    run, geometry = as_calibrated_run(source, array, calibration)
+    examine(run, geometry, source=name_of(recording), force=force, whose="" if array is None else "the given")
+    with naming(name_of(recording)):
+        windows = rest_drift(run, geometry, time=duration, lead=lead, gravity=gravity)
+    if picture is not None:
+        from gfimu.budget.drift.pictures import rest_drift_picture
+
+        rest_drift_picture(picture, windows)
+    return windows
 
 
-@former_arguments(time="duration", rate="speed_rad_s")
-def axis_drift(
-    array: AccelerometerArray | str | Path,
+def _position_results() -> tuple[type, ...]:
+    from gfimu.budget.drift.equivalent import EquivalentErrors
+
+    return (EquivalentErrors,)
+
+
+@command(results=_position_results)
+def drift_from_position(
+    from_position: Annotated[
+        tuple[float, float, float],
+        Option("Measured position error x y z after --duration, m, z up: which bias or drift would explain it?"),
+    ],
     *,
-    axis: TurningAxis | str | Sequence[float] | None = None,
-    axis_point: Sequence[float] = (0.0, 0.0, 0.0),
-    hub: str = "fixed",
-    inclination_rad: float | None = None,
-    duration: float = 30.0,
-    bias_mg: float = 0.0,
-    noise_ug: float = 0.0,
-    walk_ug: float = 0.0,
-    speed_rad_s: float = 0.0,
-    hub_noise_m_s2_rthz: float = 0.1,
-) -> AxisDrift:
-    """Budget the drift of rate and angle about a known axis, for as few as one chip.
+    duration: Annotated[float, _TIME] = 30.0,
+    known_bias_mg: Annotated[
+        tuple[float, float, float],
+        Option("With --from-position: known bias of p, x y z, mg; its share is taken off first."),
+    ] = (0.0, 0.0, 0.0),
+    latitude: Annotated[float | None, LATITUDE.also(", for the Earth's share", when="With --from-position: ")] = None,
+    gravity: Annotated[float, GRAVITY] = 9.80665,
+) -> "EquivalentErrors":
+    """Compute the bias of p and the error of the rate that would explain a measured position error of a unit at rest.
 
-    Parameters
-    ----------
-    array : AccelerometerArray, str or Path
-        The array, its name or file.
-    axis : TurningAxis, str or sequence of float, optional
-        An axis about which alone the array turns: x, y, z, or three numbers, body frame. Few chips then suffice. By
-        default the array's own.
-    axis_point : sequence of float
-        A point of that axis, body frame, m.
-    hub : {"fixed", "free"}
-        Whether that axis stands still (a table) or moves with a body (a wheel).
-    inclination_rad : float, optional
-        Angle between that axis and the vertical, rad; upright by default.
-    hub_noise_m_s2_rthz : float
-        Of a free hub, one-sided density of its own specific force, m/s²/√Hz.
-    duration, bias_mg, noise_ug, walk_ug, speed_rad_s
-        As of `drift`; ``speed_rad_s`` about the axis.
+    Raises
+    ------
+    InputError
+        If the duration is not positive or the latitude out of range.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> found = gfimu.drift_from_position((6.4, 0.0, 0.0), duration=30.0)
+    >>> print(f"{found.rate_drift_deg_h[1]:.1f} °/h")
+    29.9 °/h
+    """
+    from gfimu.budget.drift.equivalent import equivalent_errors
+
+    return equivalent_errors(from_position, duration, known_bias_mg=known_bias_mg, latitude=latitude, gravity=gravity)
+
+
+def _axis_results() -> tuple[type, ...]:
+    from gfimu.rate.axis.accuracy.drift import AxisDrift
+
+    return (AxisDrift,)
+
+
+@command(results=_axis_results)
+def axis_drift(
+    array: Annotated["AccelerometerArray | str | Path | None", _ARRAY] = None,
+    *,
+    axis: Annotated[AxisLike, AXIS_ALONE] = None,
+    duration: Annotated[float, _TIME] = 30.0,
+    bias_mg: Annotated[float, BIAS_MG] = 0.0,
+    noise_ug: Annotated[float, NOISE_UG] = 0.0,
+    walk_ug: Annotated[float, _WALK] = 0.0,
+    speed_rad_s: Annotated[float, _SPEED] = 0.0,
+    hub_noise_m_s2_rthz: Annotated[float, Option("Of a free hub: density of its own force, m/s²/√Hz.")] = 0.1,
+) -> "AxisDrift":
+    """Budget the drift of rate and angle about a known axis, for as few as one chip.
 
     Raises
     ------
@@ -217,17 +194,15 @@ def axis_drift(
     Examples
     --------
     >>> import gfimu
-    >>> found = gfimu.axis_drift("wheel_pair", time=10.0, noise_ug=290.0, rate=5.0)
+    >>> found = gfimu.axis_drift("wheel_pair", duration=10.0, noise_ug=290.0, speed_rad_s=5.0)
     >>> [one.name for one in found.terms]
     ['white noise']
     """
-    from gfimu.commands.known_axis import turning_axis
-    from gfimu.commands.opened import as_array
-    from gfimu.known_axis.accuracy.drift import axis_drift as drift_about
+    from gfimu.rate.axis.accuracy.drift import axis_drift as drift_about
 
     sources = _sources(bias_mg, noise_ug, walk_ug)
-    geometry = as_array(array)
-    turning = turning_axis(axis, axis_point, hub, inclination_rad) or geometry.turning_axis
+    geometry = as_array(array or _USUAL)
+    turning = as_known_axis(axis).of(geometry) or geometry.turning_axis
     if turning is None:
         raise InputError(f"array {geometry.name!r} has no axis of its own; give one, such as axis='z' (--axis z)")
     return drift_about(
@@ -242,19 +217,119 @@ def axis_drift(
     )
 
 
-def _sources(bias_mg: float, noise_ug: float, walk_ug: float, rate_drift_deg_h: float = 0.0) -> ErrorSources:
-    """Return the errors in SI units; raises `InputError` if there is none."""
-    from gfimu.position_drift import ErrorSources
-    from gfimu.units import STANDARD_GRAVITY
+def _results() -> tuple[type, ...]:
+    from gfimu.budget.drift.result import Drift
 
-    found = ErrorSources(
+    return (Drift,)
+
+
+def _run(given: Mapping[str, Any], as_json: bool) -> None:
+    """Call the function that the options are of, and print what it gives."""
+    from gfimu.commands.shell.printing import print_report
+
+    declared = _meant(given, *(function.__command__ for function in _FUNCTIONS))
+    own = {name: given[name] for name in declared.parameters if given.get(name) is not None}
+    print_report(declared, own, as_json=as_json)
+
+
+def _meant(
+    given: Mapping[str, Any], of_body: Command, of_rest: Command, of_position: Command, of_axis: Command
+) -> Command:
+    """Return what the options are of; raises `InputError` for one that is of something else."""
+    functions = (of_body, of_rest, of_position, of_axis)
+    usual = {name: parameter.default for one in functions for name, parameter in one.parameters.items()}
+    used = {name for name, default in usual.items() if given.get(name) not in (default, None, KnownAxis())}
+    if given["recording"] is not None:
+        if used - of_rest.parameters.keys():
+            raise InputError(
+                f"{given['recording']}: the drift of a recording goes with --array, --calibration, --duration, --lead, "
+                "--gravity, --picture, --map and --force; its noise is measured"
+            )
+        return of_rest
+    if used & _OF_RECORDINGS:
+        raise InputError("--lead, --calibration, --picture, --map and --force are of a recording; name it first")
+    if given["from_position"] is not None:
+        if used - of_position.parameters.keys():
+            raise InputError(
+                "--from-position works errors out; give it with --duration, --known-bias-mg, --latitude, --gravity"
+            )
+        return of_position
+    if used & _OF_POSITIONS:
+        raise InputError("--known-bias-mg and --latitude go with --from-position")
+    if given["axis"].of(as_array(given["array"] or _USUAL)) is None:
+        return of_body
+    if used & _OF_FREE_BODIES:
+        raise InputError("--rate-drift-deg-h, --offset and --monte-carlo have no use with a known axis (--axis)")
+    return of_axis
+
+
+@command(results=_results, doing="Monte Carlo", run=_run, parts=(drift_of_rest, drift_from_position, axis_drift))
+def drift(
+    array: Annotated["AccelerometerArray | str | Path | None", _ARRAY] = None,
+    *,
+    duration: Annotated[float, _TIME] = 30.0,
+    bias_mg: Annotated[float, BIAS_MG] = 0.0,
+    noise_ug: Annotated[float, NOISE_UG] = 0.0,
+    walk_ug: Annotated[float, _WALK] = 0.0,
+    rate_drift_deg_h: Annotated[float, Option("Constant error of the angular rate per axis, °/h.")] = 0.0,
+    speed_rad_s: Annotated[float, _SPEED] = 0.0,
+    offset: Annotated[tuple[float, float], Option("Horizontal place of the unit off the axis, x y, m.")] = (0.0, 0.0),
+    gravity: Annotated[float, GRAVITY] = 9.80665,
+    monte_carlo: Annotated[int, Option("Number of nonlinear Monte Carlo runs; 0 for none.")] = 0,
+    seed: Annotated[int, SEED] = 0,
+    progress: Annotated[Callable[[float], None] | None, PROGRESS] = None,
+) -> "Drift":
+    """Budget the position drift of an array; about a known axis see `axis_drift`.
+
+    Raises
+    ------
+    InputError
+        If there is no error to budget, or an argument is out of range.
+    GeometryError
+        If the array can't see all six motions.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> found = gfimu.drift("cube12", duration=10.0, noise_ug=290.0)
+    >>> print(f"{found.budget.total_std[0]:.1f} m")
+    27.8 m
+    """
+    import numpy as np
+
+    from gfimu.budget.drift import drift_budget
+    from gfimu.budget.drift.monte_carlo import monte_carlo_drift
+    from gfimu.budget.drift.result import Drift
+
+    if monte_carlo == 1 or monte_carlo < 0:
+        raise InputError(f"--monte-carlo {monte_carlo}: give 0 for none, or 2 or more runs")
+    sources = _sources(bias_mg, noise_ug, walk_ug, rate_drift_deg_h)
+    geometry = as_array(array or _USUAL)
+    motion: dict[str, Any] = {"rate": speed_rad_s, "offset": offset, "gravity": gravity}
+    budget = drift_budget(geometry, duration, sources, **motion)
+    sample = None
+    if monte_carlo:
+        rng = np.random.default_rng(seed)
+        sample = monte_carlo_drift(geometry, duration, sources, runs=monte_carlo, rng=rng, progress=progress, **motion)
+    return Drift(budget, sample, seed)
+
+
+_FUNCTIONS: tuple[Any, ...] = (drift, drift_of_rest, drift_from_position, axis_drift)
+
+
+def _sources(bias_mg: float, noise_ug: float, walk_ug: float, rate_drift_deg_h: float = 0.0) -> "ErrorSources":
+    """Return the errors in SI units; raises `InputError` if there is none."""
+    from gfimu.base.units import STANDARD_GRAVITY
+    from gfimu.budget.drift import ErrorSources
+
+    sources = ErrorSources(
         bias=bias_mg * 1e-3 * STANDARD_GRAVITY,
         noise_density=noise_ug * 1e-6 * STANDARD_GRAVITY,
         bias_random_walk=walk_ug * 1e-6 * STANDARD_GRAVITY,
         rate_drift=math.radians(rate_drift_deg_h / 3600.0),
     )
-    if not any(vars(found).values()):
+    if not any(vars(sources).values()):
         raise InputError(
             "no error to budget: give at least one of --bias-mg, --noise-ug, --walk-ug, --rate-drift-deg-h"
         )
-    return found
+    return sources

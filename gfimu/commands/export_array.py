@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gfimu.errors import InputError
+from gfimu.base.errors import InputError
 
 if TYPE_CHECKING:
-    from gfimu.geometry.array import AccelerometerArray
+    from gfimu.array.array import AccelerometerArray
 
 __all__ = ["export_array"]
 
@@ -21,7 +21,7 @@ def export_array(array: AccelerometerArray, target: str | Path | None, rig: str 
     InputError
         If the target is no ``.xml`` file, or there is no such rig.
     """
-    from gfimu.files.atomic_file import write_text
+    from gfimu.base.files.atomic_file import write_text
     from sim.rigs.mjcf_export import array_as_mjcf
 
     if target is not None and Path(target).suffix != ".xml":

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gfimu.errors import InputError, unknown_name
+from gfimu.base.errors import InputError, unknown_name
 
 if TYPE_CHECKING:
+    from gfimu.array.array import AccelerometerArray
+    from gfimu.base.files.memory import MemorySize
     from gfimu.calibration.result import Calibration
-    from gfimu.geometry.array import AccelerometerArray
     from gfimu.recording import Recording
+    from gfimu.recording.importing import ColumnMap
     from gfimu.sensor_noise import RecordingNoise
 
 __all__ = ["TARGETS", "export_calibration"]
@@ -29,7 +30,8 @@ def export_calibration(
     lsb_m_s2: float | None,
     chip: str | None,
     noise: RecordingNoise | Recording | str | Path | None,
-    map_set: Sequence[str] = (),
+    column_map: ColumnMap | str | Path | None = None,
+    max_memory: MemorySize | None = None,
 ) -> None:
     """Write a calibration in a format of others; arguments as `gfimu.convert`.
 
@@ -37,12 +39,12 @@ def export_calibration(
     ------
     InputError
         If the format is not named or unknown, the target is no YAML file, or as
-        `gfimu.exporting.calibrated_chip.calibrated_chips`.
+        `gfimu.calibration.exporting.calibrated_chip.calibrated_chips`.
     """
+    from gfimu.base.files.atomic_file import write_text
+    from gfimu.calibration.exporting import calibration_as_kalibr, calibration_as_ros
+    from gfimu.calibration.exporting.calibrated_chip import calibrated_chips
     from gfimu.commands.noise import noise as recorded_noise
-    from gfimu.exporting import calibration_as_kalibr, calibration_as_ros
-    from gfimu.exporting.calibrated_chip import calibrated_chips
-    from gfimu.files.atomic_file import write_text
     from gfimu.sensor_noise import RecordingNoise
 
     if to is None:
@@ -53,7 +55,7 @@ def export_calibration(
         raise InputError(f"{target}: a calibration for {to} ends in .yaml or .yml; name it so")
     found = noise
     if found is not None and not isinstance(found, RecordingNoise):
-        found = recorded_noise(found, calibration=calibration, map_set=map_set)
+        found = recorded_noise(found, calibration=calibration, column_map=column_map, max_memory=max_memory)
     chips = calibrated_chips(calibration, array, lsb_m_s2=lsb_m_s2, noise=found, chip=chip)
     write = calibration_as_kalibr if to == "kalibr" else calibration_as_ros
     text = write(chips, notes=_notes(calibration))
@@ -64,10 +66,11 @@ def export_calibration(
 def _notes(calibration: Calibration) -> list[str]:
     """Return what a reader of the file should know of the calibration."""
     from gfimu.calibration.error_model import GAUGES
+    from gfimu.calibration.parameter_names import kind_of
 
     made = f"gfimu calibration, method {calibration.method}, g = {calibration.gravity:.9g} m/s^2"
     frame = f"frame of the calibrated values: {GAUGES[calibration.gauge]}"
-    bends = "".join(kind for kind in "qc" if any(name.split("_")[1] == kind for name in calibration.names))
+    bends = "".join(kind for kind in "qc" if any(kind_of(name) == kind for name in calibration.names))
     lost = {"q": "quadratic coefficients q are", "c": "cubic coefficients c are", "qc": "coefficients q and c are"}
     left_out = [f"non-linearity: the {lost[bends]} left out; M and b are those at zero input"] if bends else []
     return [made, frame, *left_out, *calibration.statements, *(f"warning: {text}" for text in calibration.warnings)]

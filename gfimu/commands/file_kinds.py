@@ -6,7 +6,7 @@ import importlib
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from gfimu.errors import InputError, unknown_name
+from gfimu.base.errors import InputError, unknown_name
 
 if TYPE_CHECKING:
     import msgspec
@@ -14,14 +14,14 @@ if TYPE_CHECKING:
 __all__ = ["FILE_KINDS", "check_file", "file_schema"]
 
 FILE_KINDS = {
-    "array": "gfimu.geometry.array_file.ArrayFile",
-    "part": "gfimu.parts.part_file.PartFile",
-    "map": "gfimu.importing.column_map.ColumnMap",
+    "array": "gfimu.array.array_file.ArrayFile",
+    "part": "gfimu.array.parts.part_file.PartFile",
+    "map": "gfimu.recording.importing.column_map.ColumnMap",
     "twin": "sim.twin_file.TwinFile",
     "scenario": "sim.scenario_file.ScenarioFile",
     "frame": "firmware_bridge.frames.format_file.FormatFile",
-    "stage": "gfimu.uncertainty.stage.Stage",
-    "plan": "sim.sweep.plan.PlanFile",
+    "stage": "gfimu.calibration.certificate.stage.stage.Stage",
+    "plan": "sim.trials.sweep.plan.PlanFile",
     "brief": "gfimu.array_search.brief.BriefFile",
 }
 """Kinds of files by name, and the struct that is the schema of each."""
@@ -65,8 +65,8 @@ def check_file(data: Mapping[str, Any], source: str) -> str:
     """
     import msgspec
 
-    from gfimu.files.schema import Table, read
-    from gfimu.importing.map_keys import complete
+    from gfimu.base.files.schema import Table, read
+    from gfimu.recording.importing.map_keys import complete
 
     kind = next((kind for kind, key in _MARKS.items() if key in data), None)
     if kind is None:

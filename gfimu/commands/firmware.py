@@ -1,21 +1,25 @@
-"""Functions of `gfimu firmware` on the LPC1768 image in the emulator: run, build, selftest, trace, faults, check."""
+"""The LPC1768 image in the emulator: run, build, selftest, trace, faults, check.
 
-from __future__ import annotations
+Examples
+--------
+gfimu firmware selftest
+# What each command does
+gfimu firmware run --help
+"""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Annotated, Any, overload
 
-from numpy.typing import NDArray
-
-from gfimu.commands.former_arguments import former_arguments
-from gfimu.errors import InputError
-from gfimu.files.outputs import RECORDING, TRACE, OutputFolder, writes
-from gfimu.optional_packages import require
-from gfimu.results import TableResult, one_row
+from gfimu.base.errors import InputError
+from gfimu.base.files.outputs import RECORDING, TRACE, OutputFolder
+from gfimu.base.optional_packages import require
+from gfimu.commands.shell.declare import Group, Option, command
+from gfimu.commands.shell.options import BAUD, CHIPS, DURATION, IMAGE, PORT, RANGE, RATE, SCENARIO, SEED, TIME_LIMIT
 
 if TYPE_CHECKING:
+    from firmware_bridge.board.trace import TraceCounts
     from firmware_bridge.loop.board_process import BoardProcess
     from firmware_bridge.loop.fault_campaign import FaultReport
     from firmware_bridge.loop.selftest import SelfTestReport
@@ -25,38 +29,39 @@ if TYPE_CHECKING:
     from firmware_bridge.strict.check import CheckReport
     from sim.ride import Ride
 
-__all__ = ["TraceCounts", "build", "check", "faults", "run", "selftest", "trace"]
+__all__ = ["build", "check", "faults", "run", "selftest", "trace"]
 
 _BOOT_S = 0.02
+_EITHER = "give either --port (pty or tcp:PORT) or --out (a recording)"
 
 IMAGES = OutputFolder(("gfimu.elf", "gfimu.bin", "gfimu.toml", "selfcheck.elf", "selfcheck.bin", "selfcheck.toml"))
 """What a folder of built images may hold."""
 
+_RIDDEN = SCENARIO.also(", whose motion the board rides")
+_ASKED_RATE = RATE.also(", asked of the firmware, 10 to 3200")
+_NAMED_IMAGE = IMAGE.also(argument=True, metavar="[IMAGE]")
 
-@dataclass(frozen=True)
-class TraceCounts(TableResult):
-    """What a trace holds.
 
-    Parameters
-    ----------
-    events : int
-        All events.
-    accesses : int
-        Register accesses of the peripherals.
-    exceptions : int
-        Exceptions entered.
-    """
+def _of_run() -> tuple[type, ...]:
+    from firmware_bridge.loop.virtual_port import ServeReport
+    from firmware_bridge.loop.virtual_run import VirtualRun
 
-    events: int
-    accesses: int
-    exceptions: int
+    return VirtualRun, ServeReport
 
-    def to_columns(self) -> dict[str, NDArray[Any]]:
-        """Return one row of the counts."""
-        return one_row(vars(self))
 
-    def _heading(self) -> str:
-        return "Trace of the firmware"
+def _run_on_shell(given: Mapping[str, Any], as_json: bool) -> None:
+    from gfimu.commands.shell.output import print_text
+    from gfimu.commands.shell.printing import print_report
+
+    if given["port"] is None and given["out"] is None:
+        raise InputError(_EITHER)
+
+    def opened(name: str) -> None:
+        # With --json standard output is for the one object at the end; where the board is has to be known before.
+        print_text(f"board on {name}; Ctrl-C ends it", stderr=as_json)
+        print_text(f"  gfimu record --port {name} --out run.parquet", stderr=as_json)
+
+    print_report(run.__command__, {**given, "on_open": opened}, as_json=as_json)  # type: ignore[attr-defined]
 
 
 @overload
@@ -72,7 +77,7 @@ def run(
     image: str | Path = ...,
     pure_python: bool = ...,
     progress: Callable[[float], None] | None = ...,
-) -> VirtualRun: ...
+) -> "VirtualRun": ...
 
 
 @overload
@@ -88,68 +93,71 @@ def run(
     image: str | Path = ...,
     pure_python: bool = ...,
     on_open: Callable[[str], None] | None = ...,
-) -> ServeReport: ...
+) -> "ServeReport": ...
 
 
-@writes(reads=("scenario", "image"), out=RECORDING)
+@command(
+    "firmware run",
+    results=_of_run,
+    run=_run_on_shell,
+    doing=lambda given: f"running {given['image']}" if given["port"] is None else "",
+)
 def run(
     *,
-    scenario: str | Path = "paper_run",
-    port: str | None = None,
-    out: str | Path | None = None,
-    duration: float | None = None,
-    rate: int = 100,
-    range_g: int = 16,
-    realtime: bool = True,
-    seed: int = 0,
-    image: str | Path = "gfimu",
-    pure_python: bool = False,
-    progress: Callable[[float], None] | None = None,
-    on_open: Callable[[str], None] | None = None,
-) -> VirtualRun | ServeReport:
+    scenario: Annotated[str | Path, _RIDDEN] = "paper_run",
+    port: Annotated[
+        str | None,
+        PORT.also(" to open: pty, or tcp:PORT (0: any free one)"),
+    ] = None,
+    out: Annotated[
+        str | Path | None,
+        Option(
+            "Without a port: recording to write (.csv, .parquet).",
+            "FILE",
+            kind=Path,
+            writes=RECORDING,
+            what="recording",
+        ),
+    ] = None,
+    duration: Annotated[
+        float | None, DURATION.also(", of virtual time; else the scenario's, with a port without end", least=0.0)
+    ] = None,
+    rate: Annotated[int, _ASKED_RATE] = 100,
+    range_g: Annotated[int, RANGE.also(", asked of the firmware", name="--range")] = 16,
+    realtime: Annotated[
+        bool, Option("With a port: keep pace with the clock on the wall.", name="--realtime/--no-realtime")
+    ] = True,
+    seed: Annotated[int, SEED] = 0,
+    image: Annotated[str | Path, IMAGE] = "gfimu",
+    pure_python: Annotated[bool, Option("Run all peripherals in Python: slower, the same result.")] = False,
+    progress: Annotated[
+        Callable[[float], None] | None,
+        Option("Without a port: called with the share done, 0 to 1.", shell=False),
+    ] = None,
+    on_open: Annotated[
+        Callable[[str], None] | None,
+        Option("With a port: called with its name when the board answers there.", shell=False),
+    ] = None,
+) -> "VirtualRun | ServeReport":
     """Run the firmware on an emulated board that rides a scenario: behind a port, or straight into a recording.
 
-    Parameters
-    ----------
-    scenario : str or Path
-        Scenario whose motion the board rides.
-    port : str, optional
-        ``pty``, or ``tcp:PORT`` (0: any free one); without it the samples are decoded here.
-    out : str or Path, optional
-        Without a port: recording to write, ``.csv`` or ``.parquet``.
-    duration : float, optional
-        Virtual time, s; without a port the scenario's by default, behind one without end.
-    rate : int
-        Sample rate asked of the firmware, 10 to 3200 Hz.
-    range_g : int
-        Range asked of the firmware: 2, 4, 8 or 16 g (``--range``).
-    realtime : bool
-        Behind a port: keep pace with the clock on the wall.
-    seed : int
-        Seed of the chips and the noise.
-    image : str or Path
-        Image: gfimu, selfcheck, or an ELF or .bin file.
-    pure_python : bool
-        Run all peripherals in Python: slower, the same result.
-    progress : callable, optional
-        Without a port: called with the share done, 0 to 1.
-    on_open : callable, optional
-        Behind a port: called with the port's name when the board answers there.
-
-    Returns
-    -------
-    VirtualRun or ServeReport
-        The recording with its counts; behind a port what went through it.
+    Behind a port it runs until the duration is over, without one until Ctrl-C (exit code 0).
 
     Raises
     ------
     InputError
         If the emulator is not installed, an argument is wrong, the port can't be opened, or the output can't be written
         where it is asked for.
+
+    Shell
+    -----
+    gfimu firmware run --scenario paper_run --port pty
+    # Straight into a recording
+    gfimu firmware run --scenario paper_run --out run.parquet --rate 800
     """
     require("gfimu firmware run", "unicorn", "mujoco")
     if port is not None and out is not None:
-        raise InputError("give either --port (pty or tcp:PORT) or --out (a recording)")
+        raise InputError(_EITHER)
     ride = _ride(scenario, seed)
     if port is not None:
         return _behind_port(ride, port, duration, (rate, range_g), seed, image, realtime, pure_python, on_open)
@@ -159,15 +167,16 @@ def run(
         ride, duration or ride.duration, rate_hz=rate, range_g=range_g, image=image,
         fast=False if pure_python else None, progress=progress,
     )  # fmt: skip
-    if out is not None:
-        result.recording.write(out)
-    return result
+    if out is None:
+        return result
+    result.recording.write(out)
+    return replace(result, files={"recording": Path(out)})
 
 
 def _behind_port(
-    ride: Ride, port: str, duration: float | None, setup: tuple[int, int], seed: int, image: str | Path,
+    ride: "Ride", port: str, duration: float | None, setup: tuple[int, int], seed: int, image: str | Path,
     realtime: bool, pure_python: bool, on_open: Callable[[str], None] | None,
-) -> ServeReport:  # fmt: skip
+) -> "ServeReport":  # fmt: skip
     """Serve the board on a port until the time is up or Ctrl-C."""
     from firmware_bridge.frames.commands import sample_at, set_range
     from firmware_bridge.loop.virtual_port import open_port, serve
@@ -187,29 +196,45 @@ def _behind_port(
         line.close()
 
 
-@writes(reads=("image", "array"), out=IMAGES)
-def build(
-    image: str = "gfimu",
-    *,
-    out: str | Path | None = None,
-    array: str = "",
-    baud: int | None = None,
-    define: Mapping[str, str] | None = None,
-) -> BuildReport:
-    """Compile the firmware from its C sources with the compiler of the ziglang package.
+def _of_build() -> tuple[type, ...]:
+    from firmware_bridge.lpc1768.build import BuildReport
 
-    Parameters
-    ----------
-    image : str
-        Image: gfimu or selfcheck.
-    out : str or Path, optional
-        Folder for the image, made if it isn't there; the package's own by default.
-    array : str
-        Name of the array on the board, which the board then states to the host (``GFIMU_ARRAY``); none by default.
-    baud : int, optional
-        Speed of the line after power-on, bits per second (``GFIMU_BOOT_BAUD``); 115,200 by default.
-    define : mapping of str to str, optional
-        Preprocessor definitions.
+    return (BuildReport,)
+
+
+def _definitions(
+    define: Annotated[list[str], Option("Preprocessor definition; may be repeated.", "NAME=VALUE")] = (),  # type: ignore[assignment]
+) -> dict[str, str]:
+    """Return the definitions that the options of the shell say."""
+    defines = {}
+    for item in define:
+        name, equals, value = item.partition("=")
+        if not equals or not name.isidentifier():
+            raise InputError(f"--define {item!r}: write NAME=VALUE")
+        defines[name] = value
+    return defines
+
+
+@command(
+    "firmware build",
+    results=_of_build,
+    doing="compiling",
+    files=lambda report, _: {"ELF file": report.elf, "image": report.binary},
+)
+def build(
+    image: Annotated[str, replace(_NAMED_IMAGE, text="Image: gfimu or selfcheck.")] = "gfimu",
+    *,
+    out: Annotated[
+        str | Path | None,
+        Option("Folder to write: the image; else the package's own folder.", "FOLDER", kind=Path, writes=IMAGES),
+    ] = None,
+    array: Annotated[
+        str, Option("Name of the array on the board, which the board then states to the host.", "NAME", reads=True)
+    ] = "",
+    baud: Annotated[int | None, BAUD.also(", after power-on; else 115200")] = None,
+    define: Annotated[Mapping[str, str] | None, Group(_definitions, "Preprocessor definitions.")] = None,
+) -> "BuildReport":
+    """Compile the firmware from its C sources with the compiler of the ziglang package.
 
     Raises
     ------
@@ -217,6 +242,12 @@ def build(
         If the compiler is not installed, the image is unknown or the folder can't be written.
     GfimuError
         If the sources do not compile.
+
+    Shell
+    -----
+    gfimu firmware build --out build --array cube12_as_built
+    # A faster line and a slower bus
+    gfimu firmware build --out build --baud 460800 --define GFIMU_SPI_HZ=1000000U
     """
     from firmware_bridge.lpc1768.build import build as build_image
 
@@ -224,42 +255,69 @@ def build(
     return build_image(image, out, array=array, defines={**speed, **(define or {})})
 
 
-def selftest() -> SelfTestReport:
-    """Check the emulator and the firmware: interrupts, the chips' self-test, the image, both ways of running."""
+def _of_selftest() -> tuple[type, ...]:
+    from firmware_bridge.loop.selftest import SelfTestReport
+
+    return (SelfTestReport,)
+
+
+@command(
+    "firmware selftest",
+    results=_of_selftest,
+    doing="testing the emulator and the firmware",
+    exit_code=lambda report: int(not report.passed),
+)
+def selftest() -> "SelfTestReport":
+    """Check the emulator and the firmware: interrupts, the chips' self-test, the image, both ways of running.
+
+    On the shell exit code 1 if a check fails. Writes nothing.
+
+    Shell
+    -----
+    gfimu firmware selftest
+    # For a build server
+    gfimu firmware selftest --json
+    """
     from firmware_bridge.loop.selftest import run_selftest
 
     return run_selftest()
 
 
-@writes(reads=("scenario", "image"), out=TRACE)
-def trace(
-    out: str | Path,
-    *,
-    scenario: str | Path = "rest",
-    duration: float = 0.05,
-    skip: float = 0.0,
-    rate: int = 800,
-    seed: int = 0,
-    image: str | Path = "gfimu",
-) -> TraceCounts:
-    """Trace register accesses and interrupts of the firmware.
+def _of_trace() -> tuple[type, ...]:
+    from firmware_bridge.board.trace import TraceCounts
 
-    Parameters
-    ----------
-    out : str or Path
-        Trace to write: ``.vcd`` for GTKWave, or ``.rrd`` for rerun.
-    scenario, rate, seed, image
-        As for `run`.
-    duration, skip : float
-        Virtual time to trace, and before the trace, s.
+    return (TraceCounts,)
+
+
+@command("firmware trace", results=_of_trace, doing=lambda given: f"tracing {given['image']}")
+def trace(
+    out: Annotated[
+        str | Path,
+        Option("Trace to write (.vcd for GTKWave, .rrd for rerun).", "FILE", kind=Path, writes=TRACE, what="trace"),
+    ],
+    *,
+    scenario: Annotated[str | Path, _RIDDEN] = "rest",
+    duration: Annotated[float, DURATION.also(", of virtual time", least=0.0)] = 0.05,
+    skip: Annotated[float, Option("Virtual time before the trace, s.", "S", least=0.0)] = 0.0,
+    rate: Annotated[int, _ASKED_RATE] = 800,
+    seed: Annotated[int, SEED] = 0,
+    image: Annotated[str | Path, IMAGE] = "gfimu",
+) -> "TraceCounts":
+    """Trace register accesses and interrupts of the firmware.
 
     Raises
     ------
     InputError
         If the emulator is not installed, or the output can't be written where it is asked for.
+
+    Shell
+    -----
+    gfimu firmware trace --out trace.vcd --duration 0.02
+    # For rerun, from half a second on
+    gfimu firmware trace --out trace.rrd --skip 0.5
     """
     require("gfimu firmware trace", "unicorn", "mujoco")
-    from firmware_bridge.board.trace import write_rrd, write_vcd
+    from firmware_bridge.board.trace import TraceCounts, write_rrd, write_vcd
     from firmware_bridge.frames.commands import sample_at
 
     setup = sample_at(rate)
@@ -278,58 +336,86 @@ def trace(
     )
 
 
-def faults(*, seed: int = 0, progress: Callable[[float], None] | None = None) -> FaultReport:
-    """Break the wire, the supply and the chips, one after another, and return what the host makes of it."""
+def _of_faults() -> tuple[type, ...]:
+    from firmware_bridge.loop.fault_campaign import FaultReport
+
+    return (FaultReport,)
+
+
+@command("firmware faults", results=_of_faults, doing="faults", exit_code=lambda report: int(not report.passed))
+def faults(
+    *,
+    seed: Annotated[int, SEED] = 0,
+    progress: Annotated[
+        Callable[[float], None] | None, Option("Called with the share done, 0 to 1.", shell=False)
+    ] = None,
+) -> "FaultReport":
+    """Break the wire, the supply and the chips, one after another, and show what the host makes of it.
+
+    On the shell exit code 1 if the host takes a fault for data. Writes nothing.
+
+    Shell
+    -----
+    gfimu firmware faults
+    # Other noise
+    gfimu firmware faults --seed 3 --json
+    """
     from firmware_bridge.loop.fault_campaign import run_campaign
 
     return run_campaign(seed=seed, progress=progress)
 
 
-@former_arguments(seconds="duration")
+def _of_check() -> tuple[type, ...]:
+    from firmware_bridge.strict.check import CheckReport
+
+    return (CheckReport,)
+
+
+@command(
+    "firmware check",
+    results=_of_check,
+    doing=lambda given: f"running {given['image']}",
+    exit_code=lambda report: int(report.faults > 0),
+)
 def check(
-    image: str | Path = "gfimu",
+    image: Annotated[str | Path, _NAMED_IMAGE] = "gfimu",
     *,
-    duration: float = 3.0,
-    chips: int = 4,
-    baud: int | None = None,
-    time_limit: float = 60.0,
-) -> CheckReport:
+    duration: Annotated[float, DURATION.also(", of virtual time", least=0.0)] = 3.0,
+    chips: Annotated[int, CHIPS.also(": ADXL345s on SSP1, 0 to 4; their chip-selects are P2.0 and so on")] = 4,
+    baud: Annotated[int | None, BAUD.also(", that the UARTs are meant to send at; else any usual one")] = None,
+    time_limit: Annotated[float, TIME_LIMIT.also(least=0.0)] = 60.0,
+) -> "CheckReport":
     """Run an image on a board that reports what a real LPC1768 would not forgive.
 
-    Parameters
-    ----------
-    image : str or Path
-        Image: gfimu, selfcheck, or an ELF or .bin file.
-    duration : float
-        Virtual time to run, s.
-    chips : int
-        ADXL345s on SSP1, 0 to 4; their chip-selects are P2.0 and so on.
-    baud : int, optional
-        Speed that the UARTs are meant to send at, baud; any usual one by default.
-    time_limit : float
-        Real time to spend at most, s.
+    On the shell exit code 1 if there are faults. Writes nothing.
 
     Raises
     ------
     InputError
         If the emulator is not installed, an argument is wrong, or the image can't be read or does not fit the LPC1768.
+
+    Shell
+    -----
+    gfimu firmware check build/gfimu.elf
+    # An image without chips
+    gfimu firmware check blinky.bin --chips 0 --baud 115200 --duration 1
     """
     from firmware_bridge.strict.check import CheckOptions, check_image
 
     return check_image(image, CheckOptions(duration, chips, baud, time_limit))
 
 
-def _ride(scenario: str | Path, seed: int) -> Ride:
+def _ride(scenario: str | Path, seed: int) -> "Ride":
     from sim.ride import Ride
 
     return Ride(scenario, seed=seed)
 
 
-def _board(ride: Ride, image: str | Path, seed: int, *, pure_python: bool, trace: bool = False) -> BoardProcess:
+def _board(ride: "Ride", image: str | Path, seed: int, *, pure_python: bool, trace: bool = False) -> "BoardProcess":
     from firmware_bridge.loop.board_process import BoardProcess
     from firmware_bridge.loop.physics import RidePhysics
     from firmware_bridge.loop.virtual_run import typical_chips
-    from gfimu.files.model_files import list_models
+    from gfimu.base.files.model_files import list_models
 
     fast = False if pure_python else None
     name = ride.array.name if ride.array.name in list_models("arrays") else ""  # a host knows no other by its name

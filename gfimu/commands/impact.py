@@ -1,75 +1,79 @@
-"""Under `gfimu impact`: one impact in a recording, as crash and head-impact tests report it."""
+"""Measure one impact: channels zeroed and filtered to a class, time zero, polarity, peaks of p, α and ω.
 
-from __future__ import annotations
+Examples
+--------
+gfimu impact drop.csv --array nap.toml --cfc 1000 --direction +x --picture drop.png
+# The filtered channels and the motion as files
+gfimu impact drop.csv --array nap.toml --cfc 180 --out drop_cfc180.csv --estimate drop_motion.csv
+"""
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Literal
 
-from gfimu.files.outputs import ESTIMATE, PICTURE, RECORDING, writes
+from gfimu.base.files.outputs import ESTIMATE, RECORDING
+from gfimu.commands.shell.declare import Option, command
+from gfimu.commands.shell.options import ARRAY, CALIBRATION, FORCE, MAP, MAX_MEMORY, PICTURE
 
 if TYPE_CHECKING:
+    from gfimu.array.array import AccelerometerArray
+    from gfimu.base.files.memory import MemorySize
     from gfimu.calibration.result import Calibration
-    from gfimu.crash.event import Impact
-    from gfimu.geometry.array import AccelerometerArray
-    from gfimu.importing import ColumnMap
+    from gfimu.motion.impact.event import Impact
+    from gfimu.recording.importing import ColumnMap
     from gfimu.recording.mapped import RecordingLike
 
 __all__ = ["impact"]
 
 
-@writes(reads=("recording", "array", "calibration", "column_map"), out=RECORDING, estimate=ESTIMATE, picture=PICTURE)
+def _results() -> tuple[type, ...]:
+    from gfimu.motion.impact.event import Impact
+
+    return (Impact,)
+
+
+@command(results=_results, doing="measuring the impact")
 def impact(
-    recording: RecordingLike,
-    array: AccelerometerArray | str | Path | None = None,
+    recording: Annotated[
+        "RecordingLike",
+        Option(
+            "Recording with the impact, the largest in it: .csv, .parquet; another with --map.",
+            "RUN",
+            kind=Path,
+            argument=True,
+            reads=True,
+        ),
+    ],
+    array: Annotated["AccelerometerArray | str | Path | None", ARRAY.also("; else the recording's own")] = None,
     *,
-    cfc: float = 1000.0,
-    standard: str = "sae",
-    threshold_g: float = 5.0,
-    direction: str = "",
-    calibration: Calibration | str | Path | None = None,
-    column_map: ColumnMap | str | Path | None = None,
-    map_set: Sequence[str] = (),
-    out: str | Path | None = None,
-    estimate: str | Path | None = None,
-    picture: str | Path | None = None,
-    force: bool = False,
-) -> Impact:
+    cfc: Annotated[float, Option("Channel frequency class: 1000 (head), 600, 180, 60, or another.")] = 1000.0,
+    standard: Annotated[Literal["sae", "iso"], Option("Of the filter: sae (J211-1) or iso (6487).", "NAME")] = "sae",
+    threshold_g: Annotated[float, Option("Change of a channel that counts, g.")] = 5.0,
+    direction: Annotated[
+        Literal["+x", "-x", "+y", "-y", "+z", "-z"] | None,
+        Option("Where the body is accelerated (+x, -x, …): the polarity is checked."),
+    ] = None,
+    calibration: Annotated["Calibration | str | Path | None", CALIBRATION] = None,
+    column_map: Annotated["ColumnMap | str | Path | None", MAP] = None,
+    max_memory: Annotated["MemorySize | None", MAX_MEMORY] = None,
+    out: Annotated[
+        "str | Path | None",
+        Option(
+            "Recording to write (.csv, .parquet): channels zeroed and filtered, from time zero.",
+            kind=Path,
+            writes=RECORDING,
+            what="recording",
+        ),
+    ] = None,
+    estimate: Annotated[
+        "str | Path | None",
+        Option("Estimate to write (.csv, .parquet): p, α, ω from time zero.", kind=Path, writes=ESTIMATE),
+    ] = None,
+    picture: Annotated["str | Path | None", PICTURE] = None,
+    force: Annotated[bool, FORCE] = False,
+) -> "Impact":
     """Measure one impact: channels zeroed and filtered to a frequency class, time zero, polarity, peaks of p, α and ω.
 
-    Parameters
-    ----------
-    recording : Recording, path, table, or times (n,) with readings (n, c)
-        The recording, or its file; the largest impact in it is measured.
-    array : AccelerometerArray, str or Path, optional
-        The array, its name or file; the recording's own by default.
-    cfc : float
-        Channel frequency class: 1000 (head), 600, 180, 60, or another.
-    standard : {"sae", "iso"}
-        SAE J211-1 or ISO 6487.
-    threshold_g : float
-        Change of a channel that is an impact, g.
-    direction : {"+x", "-x", "+y", "-y", "+z", "-z"}, optional
-        Where the body is accelerated, body frame, if that is known; the polarity is checked by it.
-    calibration : Calibration, str or Path, optional
-        Calibration to apply first.
-    column_map : ColumnMap, str or Path, optional
-        What the columns of a foreign file are: a map, its name or TOML file (``--map``); see `gfimu.inspect`.
-    map_set : sequence of str
-        Keys of that map to set, such as ``"time.unit=ms"`` (``--map-set``); without a map they are all of it.
-    out : str or Path, optional
-        Recording to write: the channels, zeroed and filtered, time from time zero.
-    estimate : str or Path, optional
-        Estimate to write: p, α, ω in the same time.
-    picture : str or Path, optional
-        Picture to write, ``.png``, ``.svg`` or ``.pdf``.
-    force : bool
-        Go on, with a warning, where the checks of the recording would refuse it.
-
-    Returns
-    -------
-    Impact
-        `gfimu.crash.event.Impact`.
+    ``recording`` is a `Recording`, its file, a table, or times (n,), s, with readings (n, c), m/s².
 
     Raises
     ------
@@ -82,13 +86,14 @@ def impact(
     >>> import gfimu
     >>> gfimu.impact("drop.csv", array="cube12").plot()  # doctest: +SKIP
     """
+    from gfimu.base.units import STANDARD_GRAVITY
     from gfimu.commands.opened import as_calibrated_run, as_source, name_of
-    from gfimu.crash.event import ImpactSettings, measure_impact
+    from gfimu.motion.impact.event import ImpactSettings, measure_impact
     from gfimu.recording.checks import examine
-    from gfimu.units import STANDARD_GRAVITY
 
-    settings = ImpactSettings(cfc, standard, threshold_g * STANDARD_GRAVITY, direction=direction)
-    run, geometry = as_calibrated_run(as_source(recording, array, column_map, map_set), array, calibration)
+    settings = ImpactSettings(cfc, standard, threshold_g * STANDARD_GRAVITY, direction=direction or "")
+    source = as_source(recording, array, column_map, max_memory=max_memory)
+    run, geometry = as_calibrated_run(source, array, calibration)
     examine(run, geometry, source=name_of(recording), force=force)
     measured = measure_impact(run, geometry, settings)
     if out is not None:
@@ -96,7 +101,7 @@ def impact(
     if estimate is not None:
         measured.motion.write(estimate)
     if picture is not None:
-        from gfimu.crash.picture import impact_picture
+        from gfimu.motion.impact.picture import impact_picture
 
         impact_picture(picture, measured)
     return measured

@@ -1,35 +1,70 @@
-"""Under `gfimu inspect`: what a file of unknown layout seems to hold."""
+"""Show what a file holds (columns, units, rate, gaps, rails, corrupt values, chips) and a column map to start from.
 
-from __future__ import annotations
+Examples
+--------
+gfimu inspect log.csv
+# Write the column map, edit it, and import with it
+gfimu inspect log.csv --out log_map.toml
+gfimu convert log.csv run.parquet --map log_map.toml
+"""
 
 import os
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
-from gfimu.errors import InputError
-from gfimu.files.outputs import COLUMN_MAP, writes
+from gfimu.base.errors import InputError
+from gfimu.base.files.outputs import COLUMN_MAP
+from gfimu.commands.shell.declare import Option, command
+from gfimu.commands.shell.options import MAX_MEMORY, TABLE
 
 if TYPE_CHECKING:
-    from gfimu.files.table import ArrowStream
-    from gfimu.importing import Inspection
+    from collections.abc import Mapping
+
+    from gfimu.base.files.memory import MemorySize
+    from gfimu.base.files.table import ArrowStream
+    from gfimu.recording.importing import Inspection
     from gfimu.recording.mapped import RecordingLike
 
 __all__ = ["inspect"]
 
+_MOST_COLUMNS = 40
 
-@writes(reads=("file",), out=COLUMN_MAP)
-def inspect(file: RecordingLike, *, table: str = "", out: str | Path | None = None) -> Inspection:
+
+def _results() -> tuple[type, ...]:
+    from gfimu.recording.importing import Inspection
+
+    return (Inspection,)
+
+
+def _report(found: "Inspection", given: "Mapping[str, Any]") -> "_Report":
+    return _Report(found, shows_map=given["out"] is None)
+
+
+@command(results=_results, report=_report, doing="looking at the file")
+def inspect(
+    file: Annotated[
+        "RecordingLike",
+        Option(
+            "Text, gzipped or zipped, JSON, Parquet, Excel, MATLAB, HDF5, ULog, MCAP, ROS bag.",
+            "FILE", kind=Path, argument=True, reads=True,
+        ),
+    ],
+    *,
+    table: Annotated[str, TABLE.also(" By default the one with the most accelerations.")] = "",
+    out: Annotated[
+        "str | Path | None",
+        Option(
+            "Column map to write (.toml), to edit and give as --map.",
+            "FILE", kind=Path, writes=COLUMN_MAP, what="map",
+        ),
+    ] = None,
+    max_memory: Annotated["MemorySize | None", MAX_MEMORY] = None,
+) -> "Inspection":  # fmt: skip
     """Analyse a file of unknown layout: columns, units, rate, gaps, rails, corrupt values, chips, a map to start from.
 
-    Parameters
-    ----------
-    file : str, Path, table or Recording
-        A table of pandas, polars or pyarrow, a recording, or a file: text, JSON, Parquet, zip of text, Excel, MATLAB,
-        HDF5, ULog, MCAP, ROS bag.
-    table : str
-        Table, topic or member to look at; by default the one with the most accelerations.
-    out : str or Path, optional
-        Column map to write, ``.toml``.
+    A table of pandas, polars or pyarrow, or a recording, may stand in place of the file.
 
     Raises
     ------
@@ -42,10 +77,11 @@ def inspect(file: RecordingLike, *, table: str = "", out: str | Path | None = No
     >>> import gfimu
     >>> gfimu.inspect("log.csv")  # doctest: +SKIP
     """
+    from gfimu.base.files.atomic_file import write_text
+    from gfimu.base.files.memory import with_memory
     from gfimu.commands.opened import is_arrays
-    from gfimu.files.atomic_file import write_text
-    from gfimu.importing import inspect_file
     from gfimu.recording import Recording
+    from gfimu.recording.importing import inspect_file
     from gfimu.recording.mimu4444 import is_mimu4444
 
     if is_arrays(file):
@@ -56,8 +92,9 @@ def inspect(file: RecordingLike, *, table: str = "", out: str | Path | None = No
     if isinstance(file, Recording):
         source = file.to_arrow()
     else:
-        source = os.fspath(file) if isinstance(file, str | os.PathLike) else cast("ArrowStream", file)
-    if isinstance(source, str) and is_mimu4444(source):
+        path = os.fspath(file) if isinstance(file, str | os.PathLike) else None
+        source = cast("ArrowStream", file) if path is None else with_memory(path, max_memory)
+    if isinstance(source, str | Path) and is_mimu4444(source):
         raise InputError(
             f"{file}: a MIMU4444 stream, which needs no column map; gfimu convert {file} run.parquet reads it"
         )
@@ -67,5 +104,43 @@ def inspect(file: RecordingLike, *, table: str = "", out: str | Path | None = No
             if found.is_own:
                 raise InputError(f"{found.source}: {found.reasons[0]}; no map was written")
             raise InputError(f"{found.source}: no three columns that look like accelerations; no map was written")
-        write_text(out, found.map_text())
+        write_text(out, found.map_toml)
     return found
+
+
+@dataclass(frozen=True)
+class _Report:
+    """What is printed: the inspection, and its map where that is not written to a file."""
+
+    found: "Inspection"
+    shows_map: bool
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the inspection as JSON holds it."""
+        return self.found.to_dict()
+
+    def shown(self) -> Iterator[Any]:
+        """Yield the columns, the evidence for the map, and the map."""
+        from gfimu.base.declared import FileText, Line, table
+
+        found = self.found
+        if len(found.tables) > 1:
+            yield f"Tables: {'; '.join(found.tables)}. Shown: {found.table or 'the file'}."
+        more = len(found.columns) - _MOST_COLUMNS
+        yield table(
+            found.summary,
+            found.columns[:_MOST_COLUMNS],
+            "name role least median most missing",
+            left=2,
+            note=f"and {more} further columns" if more > 0 else "",
+        )
+        yield from (f"- {line}" for line in found.reasons)
+        if found.findings:
+            yield Line("Odd:", style="bold")
+            yield from (f"- {line}" for line in found.findings)
+        if found.fitting:
+            maps = ", ".join(f"--map {name}" for name in found.fitting)
+            yield Line(f"Maps that come with gfimu and fit: {maps}", style="bold")
+        if self.shows_map and found.column_map is not None:
+            yield Line("A column map to start from (--out FILE.toml writes it):", style="bold")
+            yield FileText(f"{found.map_toml}\n")

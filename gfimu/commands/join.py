@@ -1,57 +1,58 @@
-"""Under `gfimu join`: channels and a reference of two clocks in one recording."""
+"""Find the offset and the rate error between two clocks, and put channels and reference into one recording.
 
-from __future__ import annotations
+Exit code 2 if the two files don't seem to belong together; --force writes them all the same.
 
-from collections.abc import Sequence
+Examples
+--------
+gfimu join logger.csv tacho.csv --map klipper --array mine.toml --out run.parquet
+# A file of references of another layout
+gfimu join run.csv encoder.csv --reference-map encoder_map.toml --out joined.parquet
+"""
+
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-from gfimu.files.outputs import RECORDING, writes
+from gfimu.commands.shell.declare import Option, command
+from gfimu.commands.shell.options import ARRAY, FORCE, MAP, MAX_MEMORY, RECORDING_OUT, REFERENCE_MAP
 
 if TYPE_CHECKING:
-    from gfimu.geometry.array import AccelerometerArray
-    from gfimu.importing import ColumnMap
-    from gfimu.joining import Joined, ReferenceSeries
+    from gfimu.array.array import AccelerometerArray
+    from gfimu.base.files.memory import MemorySize
+    from gfimu.recording.importing import ColumnMap
+    from gfimu.recording.joining import Joined, ReferenceSeries
     from gfimu.recording.mapped import RecordingLike
 
 __all__ = ["join"]
 
 
-@writes(reads=("channels", "reference", "array", "column_map", "reference_map"), out=RECORDING)
-def join(
-    channels: RecordingLike,
-    reference: ReferenceSeries | str | Path,
-    *,
-    out: str | Path | None = None,
-    array: AccelerometerArray | str | Path | None = None,
-    column_map: ColumnMap | str | Path | None = None,
-    reference_map: ColumnMap | str | Path | None = None,
-    map_set: Sequence[str] = (),
-    reference_map_set: Sequence[str] = (),
-    most_rate_error: float = 0.02,
-    force: bool = False,
-) -> Joined:
-    """Find offset and rate error between two clocks, and write channels and reference into one recording.
+def _results() -> tuple[type, ...]:
+    from gfimu.recording.joining import Joined
 
-    Parameters
-    ----------
-    channels : Recording, path, table, or times (n,) with readings (n, c)
-        The recording of the accelerometers, or its file.
-    reference : ReferenceSeries, str or Path
-        Tachometer, encoder angle, command or gyro with times of its own, or the file.
-    out : str or Path, optional
-        Recording to write, ``.csv`` or ``.parquet``.
-    array : AccelerometerArray, str or Path, optional
-        The array of the channels; the recording's own by default.
-    column_map, reference_map : ColumnMap, str or Path, optional
-        What the columns of a foreign file are, of the channels (``--map``) and of the reference.
-    map_set, reference_map_set : sequence of str
-        Keys of these maps to set, such as ``"time.unit=ms"`` (``--map-set``); without a map they are all of it.
-    most_rate_error : float
-        Largest rate error between the clocks that is searched, a ratio.
-    force : bool
-        Go on, with a warning, where the checks of the channels would refuse them; join nevertheless where the two don't
-        seem to belong together.
+    return (Joined,)
+
+
+@command(results=_results, doing="searching the offset between the clocks")
+def join(
+    channels: Annotated[
+        "RecordingLike",
+        Option("Recording of the accelerometers.", "CHANNELS", kind=Path, argument=True, reads=True),
+    ],
+    reference: Annotated[
+        "ReferenceSeries | str | Path",
+        Option("File of the tachometer, encoder, command or gyro.", "REFERENCE", kind=Path, argument=True, reads=True),
+    ],
+    *,
+    out: Annotated["str | Path | None", RECORDING_OUT.also(needed=True)] = None,
+    array: Annotated["AccelerometerArray | str | Path | None", ARRAY.also("; else the recording's own")] = None,
+    column_map: Annotated["ColumnMap | str | Path | None", MAP] = None,
+    reference_map: Annotated["ColumnMap | str | Path | None", REFERENCE_MAP] = None,
+    max_memory: Annotated["MemorySize | None", MAX_MEMORY] = None,
+    most_rate_error: Annotated[
+        float, Option("Largest rate error between the clocks that is searched, a ratio.")
+    ] = 0.02,
+    force: Annotated[bool, FORCE.also(", or the two don't seem to belong together")] = False,
+) -> "Joined":
+    """Find offset and rate error between two clocks, and write channels and reference into one recording.
 
     Raises
     ------
@@ -64,15 +65,16 @@ def join(
     >>> import gfimu
     >>> gfimu.join("accelerometers.csv", "tacho.csv", out="run.parquet")  # doctest: +SKIP
     """
+    from gfimu.base.files.memory import with_memory
     from gfimu.commands.opened import as_array, as_source, name_of
-    from gfimu.importing import load_map
-    from gfimu.joining import ReferenceSeries, join_reference, open_reference
     from gfimu.recording import Recording
     from gfimu.recording.checks import examine
     from gfimu.recording.formats import open_recording
+    from gfimu.recording.importing import load_map
+    from gfimu.recording.joining import ReferenceSeries, join_reference, open_reference
 
     drawing = None if array is None else as_array(array)
-    source = as_source(channels, array, column_map, map_set)
+    source = as_source(channels, array, column_map, max_memory=max_memory)
     recording = source if isinstance(source, Recording) else open_recording(source, array=drawing)
     examine(recording, drawing, source=name_of(channels), force=force)
     if drawing is not None:
@@ -80,8 +82,8 @@ def join(
     if isinstance(reference, ReferenceSeries):
         series = reference
     else:
-        given = reference_map is not None or reference_map_set
-        series = open_reference(reference, load_map(reference_map, reference_map_set) if given else None)
+        mapped = None if reference_map is None else load_map(reference_map)
+        series = open_reference(with_memory(reference, max_memory), mapped)
     joined = join_reference(recording, series, most_rate_error=most_rate_error, force=force)
     if out is not None:
         joined.recording.write(out)

@@ -1,18 +1,41 @@
-"""Under `gfimu live`: the rate filter on a stream of samples."""
+"""Estimate the angular rate while samples arrive: CSV lines in, one JSON line per sample out.
 
-from __future__ import annotations
+The first line that is no comment names the columns as in a recording (t_s, a11_m_s2, … or raw counts, a11_lsb, …).
+Array and rate may stand in comment lines before it, as gfimu record writes them. An estimate comes two samples
+after its own. Where a channel contradicts the others, a line says which, how and since when; it is left out.
+
+Examples
+--------
+gfimu live --from run.parquet --follow
+# From another machine
+ssh pi cat /data/run.csv | gfimu live --array cube12 --rate 100
+# A wheel by two chips
+gfimu live --from socket://pi:4000 --array wheel.toml --axis z --hub free --unknown-start
+"""
 
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Any
 
-from gfimu.commands.former_arguments import former_arguments
-from gfimu.errors import InputError
+from gfimu.base.errors import InputError
+from gfimu.commands.known_axis import AXIS_ALONE, AxisLike, as_known_axis
+from gfimu.commands.shell.declare import Option, command
+from gfimu.commands.shell.options import (
+    ARRAY,
+    BIAS_STD_M_S2,
+    FORCE,
+    GYRO,
+    KEEP_FAULTY,
+    MAX_MEMORY,
+    RATE,
+    UNKNOWN_START,
+)
 
 if TYPE_CHECKING:
-    from gfimu.geometry.array import AccelerometerArray
-    from gfimu.geometry.turning_axis import TurningAxis
+    from gfimu.array.array import AccelerometerArray
+    from gfimu.base.files.memory import MemorySize
 
 __all__ = ["live"]
 
@@ -21,65 +44,56 @@ _START_S = 3.0  # of a stream, which are examined
 _FEWEST, _MOST = 50, 5000  # samples of that start
 
 
-@former_arguments(bias_std="bias_std_m_s2")
+def _results() -> tuple[type, ...]:
+    from gfimu.rate.health.live.channel_watch import HealthEvent
+    from gfimu.rate.stream import LiveSample, SkippedLine
+
+    return (LiveSample, SkippedLine, HealthEvent)
+
+
+def _print_lines(given: Mapping[str, Any], as_json: bool) -> None:
+    """Print the lines as they come: each is JSON in any case; with --json an error is one too."""
+    from gfimu.commands.shell.stop_signals import write_line
+
+    del as_json
+    for line in live(**given):
+        write_line(line)
+
+
+@command(results=_results, run=_print_lines)
 def live(
-    array: AccelerometerArray | str | Path | None = None,
-    rate: float | None = None,
+    array: Annotated["AccelerometerArray | str | Path | None", ARRAY.also("; else the stream's own")] = None,
+    rate: Annotated[float | None, RATE.also(", nominal; else the stream's own")] = None,
     *,
-    source: str | Path | Iterable[str] = "-",
-    follow: bool = False,
-    scale_std: float = 0.0,
-    bias_std_m_s2: float | None = None,
-    unknown_start: bool = False,
-    gyro: bool = False,
-    axis: TurningAxis | str | Sequence[float] | None = None,
-    axis_point: Sequence[float] = (0.0, 0.0, 0.0),
-    hub: str = "fixed",
-    inclination_rad: float | None = None,
-    keep_faulty: bool = False,
-    force: bool = False,
+    source: Annotated[
+        "str | Path | Iterable[str]",
+        Option(
+            "Where samples come from: - (standard input), a recording, or host:port of a TCP server.",
+            name="--from",
+            kind=str,
+            reads=True,
+        ),
+    ] = "-",
+    follow: Annotated[bool, Option("With a recording: go on reading while gfimu record writes it.")] = False,
+    scale_std: Annotated[float, Option("Uncertainty of the scale factors, a ratio (0.01 is 1 %).")] = 0.0,
+    bias_std_m_s2: Annotated[float | None, BIAS_STD_M_S2.also("; else the data sheets'")] = None,
+    unknown_start: Annotated[bool, UNKNOWN_START] = False,
+    gyro: Annotated[bool, GYRO] = False,
+    axis: Annotated[AxisLike, AXIS_ALONE] = None,
+    keep_faulty: Annotated[bool, KEEP_FAULTY] = False,
+    max_memory: Annotated["MemorySize | None", MAX_MEMORY] = None,
+    force: Annotated[bool, FORCE] = False,
 ) -> Iterator[str]:
     """Estimate the angular rate while samples arrive: CSV lines in, one JSON line per sample out.
 
-    Parameters
-    ----------
-    array : AccelerometerArray, str or Path, optional
-        The array, its name or file; by default the one that the stream's comment lines state.
-    rate : float, optional
-        Nominal sample rate, Hz; by default the one that the stream's comment lines state.
-    source : str, Path or iterable of str
-        Where samples come from (``--from``): ``-`` for standard input, a recording, ``host:port`` of a TCP server, or
-        the lines.
-    follow : bool
-        With a recording: go on reading while `gfimu.record` writes it.
-    scale_std : float
-        Uncertainty of the scale factors, a ratio.
-    bias_std_m_s2 : float, optional
-        Uncertainty of the biases, m/s²; the data sheets' by default.
-    unknown_start : bool
-        Whether the body may be spinning already.
-    gyro : bool
-        Whether to fuse the stream's gyro columns.
-    axis : TurningAxis, str or sequence of float, optional
-        The axis about which alone the array turns: x, y, z, or three numbers, body frame; one chip then suffices. By
-        default the array's own, where it can't see all six motions.
-    axis_point : sequence of float
-        A point of that axis, body frame, m.
-    hub : {"fixed", "free"}
-        Whether that axis stands still (a table) or moves with a body (a wheel).
-    inclination_rad : float, optional
-        Angle between that axis and the vertical, rad; by default from the first second.
-    keep_faulty : bool
-        Use every channel, without looking for faulty ones. By default a channel that contradicts the others is left out
-        while it does so (`gfimu.integrity.live`): from a rest at the start on, else from when the rate has settled.
-    force : bool
-        Go on, with a warning, where the checks of the first seconds would refuse the stream.
+    ``source`` may be the lines themselves. A channel that contradicts the others is left out while it does so
+    (`gfimu.rate.health.live`): from a rest at the start on, else from when the rate has settled.
 
     Returns
     -------
     iterator of str
         JSON lines, as `gfimu.rate.stream.filter_stream`; an estimate comes two samples after its own. About an axis as
-        `gfimu.known_axis.live.axis_stream`; the first estimates come after a second.
+        `gfimu.rate.axis.live.axis_stream`; the first estimates come after a second.
 
     Raises
     ------
@@ -96,14 +110,13 @@ def live(
     """
     import numpy as np
 
-    from gfimu.commands.known_axis import known_axis, turning_axis
     from gfimu.commands.opened import as_array
     from gfimu.rate.kalman import FilterSettings
-    from gfimu.rate.sensing import SensorErrors
+    from gfimu.rate.sensing import SensorErrors, calibrated_bias_std
     from gfimu.rate.stream import filter_stream, read_head
     from gfimu.recording.carried_array import carried_array
 
-    metadata, lines = read_head(_lines(source, follow=follow) if isinstance(source, str | Path) else source)
+    metadata, lines = read_head(_lines(source, max_memory, follow=follow) if isinstance(source, str | Path) else source)
     geometry = carried_array(metadata, source="the stream") if array is None else as_array(array)
     if geometry is None:
         raise InputError("--array is missing, and the stream does not state its array; give --array")
@@ -114,20 +127,22 @@ def live(
     if not isinstance(rate, int | float) or not _RATES[0] <= rate <= _RATES[1]:
         raise InputError(f"--rate {rate}: must be positive, {_RATES[0]:g} to {_RATES[1]:g} Hz")
     lines = _examined(lines, geometry, rate, force=force)
-    about = known_axis(turning_axis(axis, axis_point, hub, inclination_rad), geometry)
+    # The inclination is that of --axis: an array's own axis stands as its file says.
+    about = replace(as_known_axis(axis), inclination_rad=None).of(geometry)
     if about is not None:
-        from gfimu.known_axis.live import axis_stream
+        from gfimu.rate.axis.live import axis_stream
 
         if gyro or scale_std or bias_std_m_s2 is not None:
             raise InputError("--gyro, --scale-std and --bias-std-m-s2 have no use with a known axis; leave them out")
         return axis_stream(lines, geometry, about, rate, at_rest=not unknown_start)
-    biases = {} if bias_std_m_s2 is None else {"bias_std": bias_std_m_s2}
+    bias = calibrated_bias_std(metadata, geometry) if bias_std_m_s2 is None else bias_std_m_s2
+    biases: dict[str, Any] = {} if bias is None else {"bias_std": bias}
     errors = SensorErrors.from_parts(geometry, rate, scale_std=scale_std, **biases)
     settings = FilterSettings(start_omega=None) if unknown_start else FilterSettings(start_omega=np.zeros(3))
     watched = None
     if not keep_faulty:
-        from gfimu.integrity.live.channel_watch import LiveWatch
-        from gfimu.integrity.live.watched_filter import WatchedRateFilter
+        from gfimu.rate.health.live.channel_watch import LiveWatch
+        from gfimu.rate.health.live.watched_filter import WatchedRateFilter
         from gfimu.rate.live import LiveRateFilter
 
         live = LiveRateFilter(geometry, errors, 1.0 / rate, settings, gyro=gyro)
@@ -137,7 +152,7 @@ def live(
     return filter_stream(lines, geometry, errors, 1.0 / rate, settings, fuse_gyro=gyro, watched=watched)
 
 
-def _examined(lines: Iterator[str], array: AccelerometerArray, rate: float, *, force: bool) -> Iterator[str]:
+def _examined(lines: Iterator[str], array: "AccelerometerArray", rate: float, *, force: bool) -> Iterator[str]:
     """Pass lines on, and examine the samples of the first seconds once they are there."""
     wanted = min(max(_FEWEST, round(_START_S * rate)), _MOST)
     head: list[str] | None = []
@@ -154,7 +169,7 @@ def _examined(lines: Iterator[str], array: AccelerometerArray, rate: float, *, f
         _examine(head, array, rate, force=force)
 
 
-def _examine(lines: list[str], array: AccelerometerArray, rate: float, *, force: bool) -> None:
+def _examine(lines: list[str], array: "AccelerometerArray", rate: float, *, force: bool) -> None:
     """Check the first samples of a stream as a recording; what can't be read is left to the filter."""
     import numpy as np
 
@@ -176,15 +191,16 @@ def _examine(lines: list[str], array: AccelerometerArray, rate: float, *, force:
     examine(run, array, source="the stream's start", force=force)
 
 
-def _lines(source: str | Path, *, follow: bool) -> Iterator[str]:
+def _lines(source: str | Path, max_memory: "MemorySize | None", *, follow: bool) -> Iterator[str]:
     """Lines of the source as they arrive."""
-    from gfimu.files.input_file import is_ordinary
-    from gfimu.recording.lines import recording_lines
+    from gfimu.base.files.input_file import is_ordinary
+    from gfimu.base.files.memory import with_memory
+    from gfimu.recording.lines import recording_lines, whole_lines
 
     if source == "-":
-        return iter(sys.stdin.readline, "")
+        return whole_lines(sys.stdin.readline, "the stream")
     if is_ordinary(source):
-        return recording_lines(source, follow=follow)
+        return recording_lines(with_memory(source, max_memory), follow=follow)
     host, colon, port = str(source).removeprefix("socket://").rpartition(":")
     if not colon or not port.isdigit():
         raise InputError(f"--from {str(source)!r}: no such file; give a recording, - for standard input, or host:port")
@@ -195,10 +211,12 @@ def _socket_lines(source: str, host: str, port: int) -> Iterator[str]:
     """Lines that a TCP server sends."""
     import socket
 
+    from gfimu.recording.lines import whole_lines
+
     try:
         connection = socket.create_connection((host, port), timeout=10)
     except OSError as error:
         raise InputError(f"--from {source!r}: {error.strerror or error}; start the server first") from None
     connection.settimeout(None)
     with connection, connection.makefile("r", encoding="utf-8", errors="replace") as stream:
-        yield from stream
+        yield from whole_lines(stream.readline, source)

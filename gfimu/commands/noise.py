@@ -1,79 +1,84 @@
-"""Under `gfimu noise`: Allan deviation and noise terms of a recording at rest, also as a rate about a known axis."""
+"""Identify velocity random walk N, bias instability B, acceleration random walk K, quantisation Q and ramp R.
 
-from __future__ import annotations
+Examples
+--------
+gfimu noise rest.parquet --picture allan.png
+# For Kalibr
+gfimu noise rest.parquet --kalibr imu.yaml
+# One chip on a table
+gfimu noise rest.parquet --axis z --axis-point -0.1 0 0
+"""
 
 import math
-from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Literal
 
-from gfimu.files.outputs import KALIBR, PICTURE, writes
+from gfimu.base.files.outputs import KALIBR
+from gfimu.commands.known_axis import AXIS_PLACE, AxisLike, as_known_axis
+from gfimu.commands.shell.declare import Option, command
+from gfimu.commands.shell.options import (
+    ARRAY,
+    CALIBRATION,
+    FORCE,
+    MAP,
+    MAX_MEMORY,
+    PICTURE,
+    REST_THRESHOLD,
+    SPEED_RAD_S,
+)
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
+    from gfimu.array.array import AccelerometerArray
+    from gfimu.base.files.memory import MemorySize
     from gfimu.calibration.result import Calibration
-    from gfimu.geometry.array import AccelerometerArray
-    from gfimu.geometry.turning_axis import TurningAxis
-    from gfimu.importing import ColumnMap
+    from gfimu.recording.importing import ColumnMap
     from gfimu.recording.mapped import RecordingLike
     from gfimu.sensor_noise import RecordingNoise
 
 __all__ = ["noise"]
 
+_RECORDING = Option(
+    "Recording at rest: .csv, .parquet, a MIMU4444 stream, or text rows.", "RUN", kind=Path, argument=True, reads=True
+)
 
-@writes(reads=("recording", "calibration", "column_map", "array"), kalibr=KALIBR, picture=PICTURE)
+
+def _results() -> tuple[type, ...]:
+    from gfimu.rate.axis.accuracy.noise import NoiseAboutAxis
+    from gfimu.sensor_noise import RecordingNoise
+
+    return (RecordingNoise, NoiseAboutAxis)
+
+
+@command(results=_results, doing="identifying the noise")
 def noise(
-    recording: RecordingLike,
+    recording: Annotated["RecordingLike", _RECORDING],
     *,
-    stretch: str = "rest",
-    rest_threshold: float | None = None,
-    calibration: Calibration | str | Path | None = None,
-    column_map: ColumnMap | str | Path | None = None,
-    map_set: Sequence[str] = (),
-    kalibr: str | Path | None = None,
-    picture: str | Path | None = None,
-    array: AccelerometerArray | str | Path | None = None,
-    axis: TurningAxis | str | Sequence[float] | None = None,
-    axis_point: Sequence[float] = (0.0, 0.0, 0.0),
-    hub: str = "fixed",
-    speed_rad_s: float = math.tau,
-    force: bool = False,
-) -> RecordingNoise:
+    stretch: Annotated[
+        Literal["rest", "all"],
+        Option("Samples to use: rest (the longest one) or all (up to the first gap).", "KIND"),
+    ] = "rest",
+    rest_threshold: Annotated[float | None, REST_THRESHOLD] = None,
+    calibration: Annotated["Calibration | str | Path | None", CALIBRATION] = None,
+    kalibr: Annotated[
+        "str | Path | None", Option("Kalibr file to write (.yaml).", kind=Path, writes=KALIBR, what="Kalibr")
+    ] = None,
+    picture: Annotated["str | Path | None", PICTURE] = None,
+    force: Annotated[bool, FORCE] = False,
+    column_map: Annotated["ColumnMap | str | Path | None", MAP] = None,
+    max_memory: Annotated["MemorySize | None", MAX_MEMORY] = None,
+    axis: Annotated[AxisLike, AXIS_PLACE] = None,
+    speed_rad_s: Annotated[float, SPEED_RAD_S.also(", at which that holds", when="With --axis: ")] = math.tau,
+    array: Annotated[
+        "AccelerometerArray | str | Path | None", ARRAY.also("; else the recording's own", when="With --axis: ")
+    ] = None,
+) -> "RecordingNoise":
     """Identify velocity random walk N, bias instability B, acceleration random walk K, quantisation Q and ramp R.
 
-    Parameters
-    ----------
-    recording : Recording, path, table, or times (n,) with readings (n, c)
-        The recording at rest, or its file.
-    stretch : {"rest", "all"}
-        Samples to use: the longest rest, or everything up to the first gap.
-    rest_threshold : float, optional
-        Threshold of rest, reading unit squared; chosen by the data if not given.
-    calibration : Calibration, str or Path, optional
-        Calibration to apply first.
-    column_map : ColumnMap, str or Path, optional
-        What the columns of a foreign file are: a map, its name or TOML file (``--map``); see `gfimu.inspect`.
-    map_set : sequence of str
-        Keys of that map to set, such as ``"time.unit=ms"`` (``--map-set``); without a map they are all of it.
-    kalibr : str or Path, optional
-        Kalibr ``imu.yaml`` to write.
-    picture : str or Path, optional
-        Picture to write, ``.png``, ``.svg`` or ``.pdf``.
-    array : AccelerometerArray, str or Path, optional
-        The array, its name or file, for its rotation about a known axis; the recording's own by default.
-    axis : TurningAxis, str or sequence of float, optional
-        Axis about which alone the array turns, body frame: x, y, z, or three numbers; with it the result says what the
-        noise means for the rate (``about_axis``). By default the array's own, where it sees too little without.
-    axis_point : sequence of float
-        A point of that axis, body frame, m.
-    hub : {"fixed", "free"}
-        Whether that axis stands still (a table) or moves with a body (a wheel).
-    speed_rad_s : float
-        Rate at which that holds, rad/s.
-    force : bool
-        Go on, with a warning, where the checks of the recording would refuse it.
+    Returns
+    -------
+    RecordingNoise
+        Noise of every channel. About an axis, given or the array's own where it can't see all six motions, it is a
+        `gfimu.rate.axis.accuracy.noise.NoiseAboutAxis`, whose ``about_axis`` says what the noise means for the rate.
 
     Raises
     ------
@@ -88,17 +93,16 @@ def noise(
     >>> list(found.models)[:3]
     ['a11', 'a12', 'a13']
     """
+    from gfimu.base.files.atomic_file import write_text
     from gfimu.calibration.run_file import open_calibrated, open_uncalibrated
-    from gfimu.commands.known_axis import known_axis, turning_axis
-    from gfimu.commands.opened import as_array, as_calibration, as_source, name_of
-    from gfimu.files.atomic_file import write_text
+    from gfimu.commands.opened import as_array, as_calibration, as_run, as_source, name_of
     from gfimu.recording import Recording
     from gfimu.recording.checks import examine
     from gfimu.sensor_noise import kalibr_yaml, recording_noise
 
-    chosen = turning_axis(axis, axis_point, hub, None)
+    known = as_known_axis(axis)
     unit = None if calibration is None else as_calibration(calibration)
-    source = as_source(recording, array, column_map, map_set)
+    source = as_source(recording, array, column_map, max_memory=max_memory)
     if isinstance(source, Recording):
         run = source if unit is None else unit.apply(source)
     else:
@@ -106,14 +110,13 @@ def noise(
     given = None if array is None else as_array(array)
     examine(run, given, source=name_of(recording), force=force)
     result = recording_noise(run, stretch=stretch, rest_threshold=rest_threshold)
-    if axis is not None or array is not None or "[turning_axis]" in str(run.metadata.get("array_toml", "")):
-        from gfimu.commands.opened import as_run
-        from gfimu.known_axis.accuracy.noise import axis_noise
+    if known.axis is not None or array is not None or "[turning_axis]" in str(run.metadata.get("array_toml", "")):
+        from gfimu.rate.axis.accuracy.noise import axis_noise
 
         geometry = given or as_run(source, None)[1]
-        turning = known_axis(chosen, geometry)
+        turning = known.of(geometry)
         if turning is not None:
-            result = replace(result, about_axis=axis_noise(result, geometry, turning, rate_rad_s=speed_rad_s))
+            result = axis_noise(result, geometry, turning, rate_rad_s=speed_rad_s)
     if kalibr is not None:
         write_text(kalibr, kalibr_yaml(result))
     if picture is not None:

@@ -8,20 +8,19 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias, TypeGuard, cast
 
-import numpy as np
-
-from gfimu.errors import InputError
+from gfimu.base.errors import InputError
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
+    from gfimu.array.array import AccelerometerArray
+    from gfimu.base.files.memory import MemorySize
+    from gfimu.base.files.table import ArrowStream
     from gfimu.calibration.result import Calibration
-    from gfimu.files.table import ArrowStream
-    from gfimu.geometry.array import AccelerometerArray
-    from gfimu.importing import ColumnMap
+    from gfimu.model.world_model import WorldModel
     from gfimu.recording import Recording
+    from gfimu.recording.importing import ColumnMap
     from gfimu.recording.mapped import MappedFile, RecordingLike
-    from gfimu.world_model import WorldModel
 
 Source: TypeAlias = "Recording | str | Path | MappedFile | ArrowStream"
 """A recording, or what its readers take."""
@@ -30,6 +29,7 @@ __all__ = [
     "Source",
     "array_of",
     "as_array",
+    "as_arrays",
     "as_calibration",
     "as_run",
     "as_runs",
@@ -40,20 +40,30 @@ __all__ = [
     "name_of",
 ]
 
-_NUMBERS = (np.ndarray, list)
-
 
 def as_array(array: AccelerometerArray | str | Path) -> AccelerometerArray:
     """Return an array given as such, by name, as an array file (.toml), or as the sites of an MJCF file (.xml)."""
     if not isinstance(array, str | Path):
         return array
+    from gfimu.array.array import AccelerometerArray, check_chips
+
     if str(array).endswith(".xml"):
         from sim.rigs.mjcf_array import array_from_mjcf
 
-        return array_from_mjcf(array)
-    from gfimu.geometry.array import AccelerometerArray
+        drawn = array_from_mjcf(array)
+        check_chips(len(drawn.chips), array)
+        return drawn
 
     return AccelerometerArray.load(array)
+
+
+def as_arrays(
+    arrays: AccelerometerArray | str | Path | Sequence[AccelerometerArray | str | Path],
+) -> list[AccelerometerArray]:
+    """Return one or several arrays, each given as `as_array` takes it."""
+    from gfimu.array.array import AccelerometerArray
+
+    return [as_array(one) for one in ([arrays] if isinstance(arrays, AccelerometerArray | str | Path) else arrays)]
 
 
 def array_of(recording: Recording) -> AccelerometerArray:
@@ -85,7 +95,7 @@ def as_source(
     recording: RecordingLike,
     array: AccelerometerArray | str | Path | None = None,
     column_map: ColumnMap | str | Path | None = None,
-    map_set: Sequence[str] = (),
+    max_memory: MemorySize | None = None,
 ) -> Source:
     """Return what stands for a recording as the readers take it: the one way in for files, tables and arrays.
 
@@ -98,37 +108,42 @@ def as_source(
         The array, which arrays of numbers need.
     column_map : ColumnMap, str or Path, optional
         The map, its name or file.
-    map_set : sequence of str
-        Keys of the map to set (``--map-set``); without a map they are all of it.
+    max_memory : int or str, optional
+        Memory that reading a file may take (`gfimu.base.files.memory`).
 
     Raises
     ------
     InputError
         If there is no such map, a key is wrong, or the arrays of numbers have no array or don't fit it.
     """
+    from gfimu.base.files.memory import with_memory
     from gfimu.recording import Recording
     from gfimu.recording.mapped import MappedFile
 
     if is_arrays(recording):
-        return _of_arrays(recording, array, mapped=column_map is not None or bool(map_set))
+        return _of_arrays(recording, array, mapped=column_map is not None)
     if not isinstance(recording, Recording | str | Path | MappedFile):
-        return _of_table(recording, array, column_map, map_set)
+        return _of_table(recording, array, column_map)
     if isinstance(recording, str | Path):
-        if column_map is None and not map_set:
-            return recording
-        return files_by_map([recording], column_map, map_set=map_set)
-    if not map_set:
+        recording = with_memory(recording, max_memory)
+        return recording if column_map is None else files_by_map([recording], column_map)
+    if isinstance(recording, MappedFile):
+        recording = recording.with_memory(max_memory)
+    if column_map is None:
         return recording
     if isinstance(recording, MappedFile):
-        from gfimu.importing import load_map
+        from gfimu.recording.importing import load_map
 
-        return replace(recording, column_map=load_map(recording.column_map, map_set))
+        return replace(recording, column_map=load_map(column_map))
     raise InputError("a map is for a file, and this recording has been read already; give its file")
 
 
 def is_arrays(recording: object) -> TypeGuard[tuple[ArrayLike, ArrayLike]]:
     """Whether it is a pair of times and readings."""
-    return isinstance(recording, tuple) and len(recording) == 2 and all(isinstance(one, _NUMBERS) for one in recording)
+    import numpy as np  # here: help and completion must not wait for it
+
+    kinds = (np.ndarray, list)
+    return isinstance(recording, tuple) and len(recording) == 2 and all(isinstance(one, kinds) for one in recording)
 
 
 def _of_arrays(
@@ -147,42 +162,26 @@ def _of_table(
     table: object,
     array: AccelerometerArray | str | Path | None,
     column_map: ColumnMap | str | Path | None,
-    map_set: Sequence[str],
 ) -> Source:
-    from gfimu.files.table_columns import TableColumns
+    from gfimu.base.files.table_columns import TableColumns
 
-    if column_map is None and not map_set:
+    if column_map is None:
         return cast("Source", table if isinstance(table, TableColumns) else TableColumns(table))
-    from gfimu.importing import load_map
+    from gfimu.recording.importing import load_map
     from gfimu.recording.mapped import mapped_recording
 
-    chosen = load_map(column_map, map_set)
+    chosen = load_map(column_map)
     return mapped_recording(cast("ArrowStream", table), chosen, array=None if array is None else as_array(array))
 
 
-def files_by_map(
-    files: Sequence[str | Path],
-    column_map: ColumnMap | str | Path | None,
-    table: str | None = None,
-    map_set: Sequence[str] = (),
-) -> MappedFile:
-    """Return files of chips on one clock with their column map, and the table of each that is meant.
-
-    Raises
-    ------
-    InputError
-        If there is no such map, or a key is wrong.
-    """
-    import msgspec
-
-    from gfimu.importing import load_map
+def files_by_map(files: Sequence[str | Path], column_map: ColumnMap | str | Path) -> MappedFile:
+    """Return files of chips on one clock with their column map; raises `InputError` if there is no such map."""
+    from gfimu.base.files.input_file import as_path
+    from gfimu.recording.importing import load_map
     from gfimu.recording.mapped import MappedFile
 
-    chosen = load_map(column_map, map_set)
-    if table is not None:
-        chosen = msgspec.structs.replace(chosen, table=table)
-    first, *others = (Path(file) for file in files)
-    return MappedFile(first, chosen, tuple(others))
+    first, *others = (as_path(file) for file in files)
+    return MappedFile(first, load_map(column_map), tuple(others))
 
 
 def as_calibration(calibration: Calibration | str | Path) -> Calibration:
@@ -212,20 +211,20 @@ def as_calibrated_run(
     return open_calibrated_run(recording, unit, None if array is None else as_array(array))
 
 
-def as_twin(twin: WorldModel | str | Path) -> WorldModel:
+def as_twin(twin: WorldModel | str | Path, *, allow_code: bool) -> WorldModel:
     """Return a twin given as such, by name, as a twin file, or as a world model of one's own (``rig.py:function``).
 
     Raises
     ------
     InputError
-        If there is none of that name, or it can't be used.
+        If there is none of that name, it can't be used, or it is a file that names code and may not (``allow_code``).
     """
     if not isinstance(twin, str | Path):
         return twin
-    from gfimu.own_rig import load_model
+    from gfimu.model.own_rig import load_model
     from sim.twin import Twin
 
-    return load_model(twin) or Twin.load(twin)
+    return load_model(twin, allow_code=allow_code) or Twin.load(twin)
 
 
 def as_runs(recordings: RecordingLike | Sequence[RecordingLike]) -> list[RecordingLike]:

@@ -1,13 +1,24 @@
-"""Under `gfimu optimize`: search accelerometer arrays for a volume, a number of chips and an objective."""
+"""Search the array of chips in a volume that minimises an objective, or the front of two objectives.
 
-from __future__ import annotations
+Examples
+--------
+gfimu optimize --chips 5 --non-recursive --out best5.toml
+# By a design brief
+gfimu new brief --out brief.toml
+gfimu optimize brief.toml --picture best.png
+# What each further chip gains
+gfimu optimize --chips 4 --most-chips 10 --pareto chips gdop --front by_chips
+"""
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-from gfimu.errors import InputError
-from gfimu.files.outputs import ARRAY_FILE, PICTURE, OutputFolder, writes
+from gfimu.base.errors import InputError
+from gfimu.base.files.outputs import ARRAY_FILE, OutputFolder
+from gfimu.commands.shell import completion
+from gfimu.commands.shell.declare import Option, command
+from gfimu.commands.shell.options import CHIPS, PICTURE, PROGRESS, SEED
 
 if TYPE_CHECKING:
     import numpy as np
@@ -15,7 +26,7 @@ if TYPE_CHECKING:
 
     from gfimu.array_search.brief import BriefFile
     from gfimu.array_search.front import Front
-    from gfimu.array_search.problem import Problem, Sites
+    from gfimu.array_search.problem import Sites
     from gfimu.array_search.search import SearchResult
 
 __all__ = ["optimize"]
@@ -24,74 +35,75 @@ _MOST_CHIPS, _MOST_RESTARTS = 200, 100_000  # more take days
 _MORE_CHIPS = 4  # of a front over chips, beyond the least number, unless the largest is given
 
 
-@writes(
-    reads=("brief",),
-    out=ARRAY_FILE,
-    picture=PICTURE,
-    front=OutputFolder(("front.json", "front.png"), needs=("matplotlib",)),
-)
-def optimize(
-    chips: int | None = None,
-    *,
-    brief: str | Path | None = None,
-    axes_per_chip: int | None = None,
-    box_m: ArrayLike | None = None,
-    min_spacing_m: float | None = None,
-    non_recursive: bool = False,
-    objective: str | None = None,
-    pareto: tuple[str, str] | None = None,
-    most_chips: int | None = None,
-    restarts: int | None = None,
-    seed: int | None = None,
-    out: str | Path | None = None,
-    picture: str | Path | None = None,
-    front: str | Path | None = None,
-    rng: np.random.Generator | None = None,
-    part: str | None = None,
-    name: str = "",
-    report: Callable[[Any], None] | None = None,
-    n_chips: int | None = None,
-) -> SearchResult | Front:
-    """Search the array of chips in a volume that minimises an objective, or the front of two objectives.
+def _results() -> tuple[type, ...]:
+    from gfimu.array_search.front import Front
+    from gfimu.array_search.search import SearchResult
 
-    Parameters
-    ----------
-    chips, n_chips : int
-        Number of chips; two names of one argument.
-    brief : str or Path, optional
-        Design brief (``gfimu new brief``); the other arguments replace its values.
-    axes_per_chip : int, optional
-        Sensing axes of a chip: 1, 2 or 3 (the default).
-    box_m : array_like, shape (3,), optional
-        Edges of a box around the body origin along body x, y, z, m; zero makes it flat; 0.1 m each by default.
-    min_spacing_m : float, optional
-        Least distance between two chips, m; 5 mm by default.
-    non_recursive : bool
-        Accept only arrays whose angular acceleration is free of ω².
-    objective : str, optional
-        What is to be small (`gfimu.array_search.objectives.OBJECTIVES`); GDOP by default.
-    pareto : tuple of str, optional
-        Two objectives, or one and ``chips`` or ``size``: their front is searched.
-    most_chips : int, optional
-        Of a front over chips: the largest number of chips; four more than ``chips`` by default.
-    restarts : int, optional
-        Most starts; 40 by default, fewer once ten agree.
-    seed : int, optional
-        Seed of the random starts; 0 by default.
-    out : str or Path, optional
-        Array file to write, ``.toml``.
-    picture : str or Path, optional
-        Picture of the array in its volume to write.
-    front : str or Path, optional
-        Folder of the front: ``front.json``, ``front.png`` and an array file per point.
-    rng : numpy.random.Generator, optional
-        Source of the random starts in place of ``seed``.
-    part : str, optional
-        Part of the chips in the result.
-    name : str
-        Name of the result; the file's by default.
-    report : callable, optional
-        Called with the number of starts done; of a front, with the share of the work.
+    return SearchResult, Front
+
+
+@command(results=_results, doing="searching arrays")
+def optimize(
+    chips: Annotated[int | None, CHIPS] = None,
+    *,
+    brief: Annotated[
+        str | Path | None,
+        Option(
+            "Design brief (.toml; gfimu new brief); options replace its values.",
+            "[BRIEF]",
+            kind=Path,
+            argument=True,
+            reads=True,
+        ),
+    ] = None,
+    axes_per_chip: Annotated[int | None, Option("Sensing axes of a chip: 1, 2 or 3; 3 by default.")] = None,
+    box_m: Annotated[
+        "ArrayLike | None",
+        Option(
+            "Edges of a box around the body origin, m; 0.1 0.1 0.1 by default, zero makes it flat.",
+            kind=tuple[float, float, float],
+        ),
+    ] = None,
+    min_spacing_m: Annotated[float | None, Option("Least distance between chips, m; 0.005 by default.")] = None,
+    non_recursive: Annotated[bool, Option("Only arrays whose angular acceleration is free of ω².")] = False,
+    objective: Annotated[
+        str | None,
+        Option(
+            "What is to be small: gdop (default), gdop_joint, kappa, sigma_alpha, sigma_p, rate, drift, fault; with "
+            "_worst at the end over the brief's tolerances.",
+            "NAME",
+            offers=completion.objectives,
+        ),
+    ] = None,
+    pareto: Annotated[
+        tuple[str, str] | None,
+        Option("Search the front of two objectives, or of one and chips or size; with --front."),
+    ] = None,
+    most_chips: Annotated[
+        int | None, Option("Of a front over chips: the largest number of them; by default four more than the least.")
+    ] = None,
+    restarts: Annotated[int | None, Option("Most random starts; 40 by default, fewer once ten agree.")] = None,
+    seed: Annotated[int | None, SEED.also("; by default that of the brief, or 0")] = None,
+    out: Annotated[
+        str | Path | None, Option("Array file to write (.toml).", kind=Path, writes=ARRAY_FILE, what="array")
+    ] = None,
+    picture: Annotated[str | Path | None, PICTURE.also(": the array in its volume")] = None,
+    front: Annotated[
+        str | Path | None,
+        Option(
+            "Folder to write: the front as picture, table and array files.",
+            kind=Path,
+            writes=OutputFolder(("front.json", "front.png"), needs=("matplotlib",)),
+        ),
+    ] = None,
+    rng: Annotated[
+        "np.random.Generator | None", Option("Random number generator in place of the seed.", shell=False)
+    ] = None,
+    part: Annotated[str | None, Option("Part of the chips; by default that of the brief.", shell=False)] = None,
+    name: Annotated[str, Option("Name of the array; by default that of its file.", shell=False)] = "",
+    progress: Annotated[Callable[[float], None] | None, PROGRESS] = None,
+) -> "SearchResult | Front":
+    """Search the array of chips in a volume that minimises an objective, or the front of two objectives.
 
     Returns
     -------
@@ -115,9 +127,10 @@ def optimize(
     import numpy as np
 
     from gfimu.array_search.brief import problem_of
+    from gfimu.array_search.front import find_front
     from gfimu.array_search.objectives import objective as named
     from gfimu.array_search.search import search
-    from gfimu.files.atomic_file import write_text
+    from gfimu.base.files.atomic_file import write_text
 
     if (pareto is None) != (front is None):
         raise InputError("--pareto A B and --front DIR go together: the two objectives, and the folder of their front")
@@ -125,51 +138,34 @@ def optimize(
         raise InputError("--most-chips is of a front over chips; give --pareto chips OBJECTIVE --front DIR too")
     if pareto is not None and (out is not None or picture is not None):
         raise InputError("a front has many arrays, which --front takes; leave out --out and --picture")
-    number = n_chips if chips is None else chips
-    _require_in_range(number, restarts, seed)
-    wanted = _changed(
-        brief,
-        {
-            "chips": number,
-            "axes_per_chip": axes_per_chip,
-            "min_spacing_m": min_spacing_m,
-            "non_recursive": non_recursive or None,
-            "starts": restarts,
-            "seed": seed,
-            "part": part,
-        },
-        box_m,
-        objective,
-    )
+    _require_in_range(chips, restarts, seed)
+    changes = {
+        "chips": chips,
+        "axes_per_chip": axes_per_chip,
+        "min_spacing_m": min_spacing_m,
+        "non_recursive": non_recursive or None,
+        "starts": restarts,
+        "seed": seed,
+        "part": part,
+    }
+    wanted = _changed(brief, changes, box_m, objective)
     problem, conditions = problem_of(wanted, _sites(wanted, brief))
     source = np.random.default_rng(wanted.seed) if rng is None else rng
+    starts = wanted.starts
     if pareto is not None and front is not None:
-        from gfimu.array_search.front import find_front
-
-        found = find_front(
-            problem,
-            conditions,
-            pareto,
-            source,
-            most_chips=most_chips or problem.n_chips + _MORE_CHIPS,
-            starts=wanted.starts,
-            report=report,
-        )
-        _write_front(Path(front), found)
-        return found
-    result = search(
-        problem,
-        named(wanted.objective.name, problem, conditions),
-        source,
-        starts=wanted.starts,
-        part=wanted.part,
-        name=name or (Path(out).stem if out is not None else ""),
-        report=report,
-    )
+        most = most_chips or problem.n_chips + _MORE_CHIPS
+        arrays = find_front(problem, conditions, pareto, source, most_chips=most, starts=starts, report=progress)
+        _write_front(Path(front), arrays)
+        return arrays
+    goal = named(wanted.objective.name, problem, conditions)
+    name = name or ("" if out is None else Path(out).stem)
+    result = search(problem, goal, source, starts=starts, part=wanted.part, name=name, report=progress)
     if out is not None:
         write_text(out, result.array.to_toml())
     if picture is not None:
-        _draw(picture, result, problem)
+        from gfimu.array_search.pictures import array_picture
+
+        array_picture(picture, result.array, problem)
     return result
 
 
@@ -181,8 +177,8 @@ def _require_in_range(chips: int | None, restarts: int | None, seed: int | None)
 
 
 def _changed(
-    brief: str | Path | None, changes: dict[str, Any], box_m: ArrayLike | None, objective: str | None
-) -> BriefFile:
+    brief: str | Path | None, changes: dict[str, Any], box_m: "ArrayLike | None", objective: str | None
+) -> "BriefFile":
     """Return the brief, or the default one, with the values that were given besides."""
     import msgspec
     import numpy as np
@@ -201,7 +197,7 @@ def _changed(
     return msgspec.structs.replace(found, **given)
 
 
-def _sites(wanted: BriefFile, brief: str | Path | None) -> Sites | None:
+def _sites(wanted: "BriefFile", brief: str | Path | None) -> "Sites | None":
     """Read the candidate sites of a brief, beside it or from the current directory."""
     from gfimu.array_search.brief import SitesTable, sites_of_array, sites_of_csv
 
@@ -215,7 +211,7 @@ def _sites(wanted: BriefFile, brief: str | Path | None) -> Sites | None:
 
         return sites_of_array(array_from_mjcf(path, sites=table.names), str(path))
     if path.suffix == ".toml":
-        from gfimu.geometry.array import AccelerometerArray
+        from gfimu.array.array import AccelerometerArray
 
         return sites_of_array(AccelerometerArray.load(path), str(path))
     if path.suffix != ".csv":
@@ -225,24 +221,18 @@ def _sites(wanted: BriefFile, brief: str | Path | None) -> Sites | None:
     return sites_of_csv(path)
 
 
-def _draw(path: str | Path, result: SearchResult, problem: Problem) -> None:
-    from gfimu.array_search.pictures import array_picture
-
-    array_picture(path, result.array, problem)
-
-
-def _write_front(folder: Path, found: Front) -> None:
+def _write_front(folder: Path, found: "Front") -> None:
     import json
 
     from gfimu.array_search.pictures import front_picture
-    from gfimu.files.atomic_file import write_text
+    from gfimu.base.files.atomic_file import write_text
 
     folder.mkdir(exist_ok=True)
     for point in found.points:
-        write_text(folder / f"{point.array.name}.toml", point.array.to_toml())
+        write_text(folder / f"{point.name}.toml", point.array.to_toml())
     write_text(folder / "front.json", json.dumps(found.to_dict(), indent=2) + "\n")
     front_picture(folder / "front.png", found)
-    written = {f"{point.array.name}.toml" for point in found.points}
+    written = {f"{point.name}.toml" for point in found.points}
     for file in folder.glob("front_[0-9][0-9].toml"):  # of the front that this one replaces, which had more points
         if file.name not in written:
             file.unlink()

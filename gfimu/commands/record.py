@@ -1,108 +1,87 @@
-"""Under `gfimu record`: a recording from a board on a port."""
+"""Record from a board (real or virtual), with the angular rate shown as it comes.
 
-from __future__ import annotations
+If the recording begins with a rest, channels that contradict the others are named while it is made. The file can be
+read while it grows; if the program is killed, at most the last half second is missing. Ctrl-C ends the recording and
+keeps it (exit code 0). Exit code 1 if a chip fails the self-test.
+
+Examples
+--------
+gfimu record --port /dev/ttyUSB0 --out run.parquet --rate 800 --duration 60
+# Find the board and test its chips first
+gfimu record --find --self-test --out run.parquet
+# A 3-D printer's Klipper
+gfimu record --port "klipper:///tmp/klippy_uds?chip=hotend,bed" --array pair.toml --out run.parquet
+"""
 
 import warnings
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Any
 
-from gfimu.errors import InputError, RecordingWarning
-from gfimu.files.outputs import RECORDING, RERUN, writes
-from gfimu.optional_packages import require
+from gfimu.base.errors import InputError, RecordingWarning
+from gfimu.base.optional_packages import require
+from gfimu.commands.record_settings import BoardSettings, RecordCallbacks
+from gfimu.commands.shell.declare import Group, Option, command
+from gfimu.commands.shell.options import DURATION, PORT, RECORDING_OUT, RRD
 
 if TYPE_CHECKING:
     from firmware_bridge.frames.decoder import StreamCounts
     from firmware_bridge.frames.frame_format import FrameFormat
-    from firmware_bridge.host.chip_selftest import AxisSelfTest
     from firmware_bridge.host.finder import Found
     from firmware_bridge.host.live import LiveView
     from firmware_bridge.host.mounting.fit import FirstSamples
-    from firmware_bridge.host.recorder import Batch, RecordReport
-    from gfimu.geometry.array import AccelerometerArray
-    from gfimu.integrity.fault import ChannelFault
+    from firmware_bridge.host.record_report import RecordReport
+    from firmware_bridge.host.recorder import Batch
+    from gfimu.array.array import AccelerometerArray
+    from gfimu.rate.health.fault import ChannelFault
 
 __all__ = ["record"]
 
 
-@writes(reads=("port", "array"), out=RECORDING, rrd=RERUN)
-def record(
-    port: str = "",
-    out: str | Path | None = None,
-    *,
-    find: bool = False,
-    self_test: bool = False,
-    duration: float | None = None,
-    rate: int | None = None,
-    range_g: int | None = None,
-    form: str = "",
-    array: str = "",
-    baud: int | None = None,
-    reconnect: float | None = None,
-    rrd: str | Path | None = None,
-    live: bool = False,
-    on_text: Callable[[str], None] | None = None,
-    on_fault: Callable[[str], None] | None = None,
-    on_note: Callable[[str], None] | None = None,
-    on_find: Callable[[Found], None] | None = None,
-    on_try: Callable[[str], None] | None = None,
-    on_self_test: Callable[[list[AxisSelfTest]], None] | None = None,
-    choose_array: Callable[[tuple[AccelerometerArray, ...]], str] | None = None,
-    stop: Callable[[], bool] | None = None,
-) -> RecordReport | None:
-    """Record from a board, real or virtual, until the duration ends, ``stop`` returns true, or Ctrl-C.
+def _results() -> tuple[type, ...]:
+    from firmware_bridge.host.record_report import BoardsFound, Recorded
 
-    Parameters
-    ----------
-    port : str
-        Device, pseudo-terminal, ``socket://host:port``, ``udp://address:port``, ``klipper:///socket?chip=NAME``, or
-        ``phyphox://address:port``; may be left out with ``find``.
-    out : str or Path, optional
-        Recording to write, ``.csv`` or ``.parquet``; can be read while it grows. May be left out with ``find``.
-    find : bool
-        Look for boards first: on ``port`` or every serial port, at the usual speeds, in ``form`` or every format. With
-        ``out``, the first that is found is recorded.
-    self_test : bool
-        Test the chips first, while the unit rests: the shift under self-test against the data sheet's limits at 3.3 V.
-    duration : float, optional
-        Length, s of board time; by default until stopped.
-    rate : int, optional
-        Ask the board for this sample rate, 10 to 3200 Hz.
-    range_g : int, optional
-        Ask the board for ±2, 4, 8 or 16 g (``--range``).
-    form : str
-        Frame format (``--format``): a key of `firmware_bridge.frames.frame_format.FORMATS`; else ``lpc1768``, or
-        what is found. Klipper and phyphox send samples and have none.
-    array : str
-        Array on the board (``--array``); by default the one that the board states, or the format's. A board of the
-        format ``lpc1768`` that states none is recorded without an array, with a `gfimu.errors.RecordingWarning` that
-        names the arrays that it may be. It may have fewer chips than four: then the array's chips are the first ones.
-    baud : int, optional
-        Bits per second. By default the speed at which the board is, raised if the sample rate needs more.
-    reconnect : float, optional
-        Wait this long for a port that is not there yet, and for a lost connection, s; by default the port has to be
-        there at once, and a lost connection is waited for a minute.
-    rrd : str or Path, optional
-        Rerun recording to write while recording.
-    live : bool
-        Open the rerun viewer and show what comes in: rate, health of the channels, readings, scene (``--live``, also
-        ``--view``). A viewer that is closed does not end the recording.
-    on_text : callable, optional
-        Is given a line of text with the angular rate a few times a second.
-    on_fault : callable, optional
-        Is given a sentence when a channel contradicts the others, and when it does so no longer
-        (`gfimu.integrity.live`). The recording has every channel all the same.
-    on_note : callable, optional
-        Is given a sentence on what is shown: that the filter is being compiled, that it catches up.
-    on_find, on_try : callable, optional
-        Are given each board that is found, and each port before it is tried.
-    on_self_test : callable, optional
-        Is given the results of the self-test, channel by channel.
-    choose_array : callable, optional
-        Is asked for the array, of those that may be on the board, if neither ``array`` nor the board states it.
-    stop : callable, optional
-        Asked often; True ends the recording.
+    return Recorded, BoardsFound
+
+
+def _run(given: dict[str, Any], as_json: bool) -> None:
+    from gfimu.commands.record_screen import record_on_screen
+
+    record_on_screen(record, given, as_json=as_json)
+
+
+_BOARD = Group(
+    BoardSettings, "The board: ``gfimu.BoardSettings(rate=800, array='cube12')``; by default as it is, or says."
+)
+
+
+@command(results=_results, run=_run)
+def record(
+    port: Annotated[
+        str,
+        PORT.also(
+            ": a device, a pseudo-terminal, socket://host:port, udp://address:port, klipper:///socket?chip=NAME, "
+            "or phyphox://address:port",
+            reads=True,
+        ),
+    ] = "",
+    out: Annotated["str | Path | None", RECORDING_OUT] = None,
+    *,
+    find: Annotated[bool, Option("Look for the board: every port or --port, every speed and format.")] = False,
+    self_test: Annotated[bool, Option("Test the chips first, at rest, against the data sheet's limits.")] = False,
+    duration: Annotated[float | None, DURATION.also("; else until Ctrl-C", least=0.0)] = None,
+    board: Annotated["BoardSettings | None", _BOARD] = None,
+    rrd: Annotated["str | Path | None", RRD.also(" while recording")] = None,
+    live: Annotated[bool, Option("Show rate, health and scene in the rerun viewer meanwhile.")] = False,
+    callbacks: Annotated[
+        "RecordCallbacks | None",
+        Option("What is called meanwhile: ``gfimu.RecordCallbacks(on_fault=print)``.", shell=False),
+    ] = None,
+) -> "RecordReport | None":
+    """Record from a board, real or virtual, until the duration ends, a callback says so, or Ctrl-C.
+
+    Port and output may be left out with ``find``, which records the first board that is found. The file can be read
+    while it grows. A viewer that is closed does not end the recording.
 
     Returns
     -------
@@ -124,58 +103,63 @@ def record(
     from firmware_bridge.host.mounting.fit import FirstSamples
     from firmware_bridge.host.recorder import record as record_port
     from firmware_bridge.sources.ports import has_own_samples, port_format
-    from gfimu.geometry.array import AccelerometerArray
+    from gfimu.array.array import AccelerometerArray
 
+    board, callbacks = board or BoardSettings(), callbacks or RecordCallbacks()
     if (find or self_test) and has_own_samples(port):
         raise InputError(f"{port}: --find and --self-test are for boards that answer; leave them out")
     if find:
-        found = _found(port, form, on_find, on_try)
-        port, form = found.port, found.form
+        found = _found(port, board.form, callbacks)
+        port, board = found.port, replace(board, form=found.form)
     if self_test:
         from firmware_bridge.host.chip_selftest import check_chips
 
-        tested = check_chips(_needed(port), baud=baud, form=form or "lpc1768", array=array)
-        if on_self_test is not None:
-            on_self_test(tested)
+        tested = check_chips(_needed(port), baud=board.baud, form=board.form or "lpc1768", array=board.array)
+        if callbacks.on_self_test is not None:
+            callbacks.on_self_test(tested)
     if out is None:
-        given = {"duration": duration, "rate": rate, "range": range_g, "rrd": rrd, "live": live or None, "baud": baud}
+        given = {
+            "duration": duration, "rate": board.rate, "range": board.range_g, "rrd": rrd, "live": live or None,
+            "baud": board.baud,
+        }  # fmt: skip
         without = [f"--{name}" for name, value in given.items() if value is not None]
         if without or not (find or self_test):
             raise InputError(f"{', '.join(without) or 'record'}: give the recording to write with --out")
         return None
     port = _needed(port)
-    setup = [set_range(range_g)] if range_g is not None else []
-    setup += [set_rate(rate)] if rate is not None else []
-    form_read = port_format(port, form, array)
+    setup = [set_range(board.range_g)] if board.range_g is not None else []
+    setup += [set_rate(board.rate)] if board.rate is not None else []
+    form = port_format(port, board.form, board.array)
     samples = FirstSamples()
-    view = _LateView(form_read, (on_text, on_fault, on_note), rrd, live=live)
-    if array or not form_read.array_is_assumed:
-        view.open(AccelerometerArray.load(array or form_read.array))
+    view = _LateView(form, callbacks, rrd, live=live)
+    if board.array or not form.array_is_assumed:
+        view.open(AccelerometerArray.load(board.array or form.array))
 
-    def take(batch: Batch, counts: StreamCounts) -> None:
+    def take(batch: "Batch", counts: "StreamCounts") -> None:
         samples(batch, counts)
         view(batch, counts)
 
     try:
         report = record_port(
-            port, out, duration_s=duration, form=form, array=array, baud=baud, setup=tuple(setup),
-            reconnect_s=reconnect, on_batch=take, on_array=view.open, choose_array=choose_array, stop=stop,
+            port, out, duration_s=duration, form=board.form, array=board.array, baud=board.baud, setup=tuple(setup),
+            reconnect_s=board.reconnect, on_batch=take, on_array=view.open, choose_array=callbacks.choose_array,
+            stop=callbacks.stop,
         )  # fmt: skip
     except BaseException:
         view.close(keep=False)
         raise
     view.close()
-    _warn_of_array(report, samples, form_read, view.array)
+    _warn_of_array(report, samples, form, view.array)
     return replace(report, faults=tuple(entry for fault in view.faults for entry in fault.entries()))
 
 
 def _warn_of_array(
-    report: RecordReport, samples: FirstSamples, form: FrameFormat, array: AccelerometerArray | None
+    report: "RecordReport", samples: "FirstSamples", form: "FrameFormat", array: "AccelerometerArray | None"
 ) -> None:
     """Warn where the array of a recording is open, or contradicted by the board or by what it sent."""
     from firmware_bridge.host.mounting.fit import open_array_text, other_array_text
     from firmware_bridge.host.mounting.on_board import candidate_arrays
-    from gfimu.geometry.array import AccelerometerArray
+    from gfimu.array.array import AccelerometerArray
 
     if not report.array:
         texts = [open_array_text(candidate_arrays(form), samples, _count_size(form, None), str(report.path))]
@@ -188,10 +172,10 @@ def _warn_of_array(
             warnings.warn(f"{report.path}: {text}", RecordingWarning, stacklevel=3)
 
 
-def _count_size(form: FrameFormat, array: AccelerometerArray | None) -> float:
+def _count_size(form: "FrameFormat", array: "AccelerometerArray | None") -> float:
     """Size of a count, m/s²."""
-    from gfimu.geometry.array import AccelerometerArray
-    from gfimu.parts.part import Part
+    from gfimu.array.array import AccelerometerArray
+    from gfimu.array.parts.part import Part
 
     carried = AccelerometerArray.load(form.array) if array is None else array
     return form.count_m_s2 or Part.load(carried.chips[0].part, carried.part_files).lsb
@@ -203,22 +187,20 @@ def _needed(port: str) -> str:
     return port
 
 
-def _found(
-    port: str, form: str, on_find: Callable[[Found], None] | None, on_try: Callable[[str], None] | None
-) -> Found:
+def _found(port: str, form: str, callbacks: RecordCallbacks) -> "Found":
     """Return the first board that is found."""
     from firmware_bridge.host.finder import SPEEDS, find_boards
 
-    boards = find_boards([port] if port else [], [form] if form else [], on_try=on_try)
+    boards = find_boards([port] if port else [], [form] if form else [], on_try=callbacks.on_try)
     if not boards:
         speeds = ", ".join(str(speed) for speed in sorted(SPEEDS))
         raise InputError(
             f"{port or 'serial ports'}: no board answers or sends {form or 'a known format'} at {speeds} baud; "
             "check power, cable and --format (docs/how_to/bench.md)"
         )
-    for board in boards:
-        if on_find is not None:
-            on_find(board)
+    if callbacks.on_find is not None:
+        for board in boards:
+            callbacks.on_find(board)
     return boards[0]
 
 
@@ -226,29 +208,24 @@ class _LateView:
     """The live view of a recording, opened when its array is settled; without one no rate is shown."""
 
     def __init__(
-        self,
-        form: FrameFormat,
-        say: tuple[Callable[[str], None] | None, Callable[[str], None] | None, Callable[[str], None] | None],
-        rrd: str | Path | None,
-        *,
-        live: bool,
+        self, form: "FrameFormat", callbacks: RecordCallbacks, rrd: "str | Path | None", *, live: bool
     ) -> None:
-        self._form, self._say, self._rrd, self._live = form, say, rrd, live
+        self._form, self._callbacks, self._rrd, self._live = form, callbacks, rrd, live
         self.array: AccelerometerArray | None = None
         self._view: LiveView | None = None
         self._opened = False
         if live:
             require("--live", "rerun")
-            from gfimu.files.rerun_stream import check_display
+            from gfimu.base.files.rerun_stream import check_display
 
             check_display()
 
-    def open(self, array: AccelerometerArray | None) -> None:
+    def open(self, array: "AccelerometerArray | None") -> None:
         """Open the view of an array; raises `InputError` if a picture is asked for and the array is not known."""
         self.array = array
-        on_text, on_fault, on_note = self._say
+        said = self._callbacks
         has_picture = self._live or self._rrd is not None
-        if self._opened or not (has_picture or on_text is not None or on_fault is not None):
+        if self._opened or not (has_picture or said.on_text is not None or said.on_fault is not None):
             return
         self._opened = True
         if array is None:
@@ -259,7 +236,7 @@ class _LateView:
             return
         picture = None
         if has_picture:
-            from gfimu.files.rerun_stream import quiet_sdk
+            from gfimu.base.files.rerun_stream import quiet_sdk
 
             quiet_sdk()
             from gfimu.visual.live import LivePicture
@@ -268,11 +245,11 @@ class _LateView:
         from firmware_bridge.host.live import LiveView
 
         self._view = LiveView(
-            array, _count_size(self._form, array), on_text=on_text, on_fault=on_fault, on_note=on_note,
+            array, _count_size(self._form, array), on_text=said.on_text, on_fault=said.on_fault, on_note=said.on_note,
             rrd=None if self._rrd is None else Path(self._rrd), viewer=self._live, picture=picture,
         )  # fmt: skip
 
-    def __call__(self, batch: Batch, counts: StreamCounts) -> None:
+    def __call__(self, batch: "Batch", counts: "StreamCounts") -> None:
         if self._view is not None:
             self._view(batch, counts)
 
@@ -282,6 +259,6 @@ class _LateView:
             self._view.close(keep=keep)
 
     @property
-    def faults(self) -> tuple[ChannelFault, ...]:
+    def faults(self) -> "tuple[ChannelFault, ...]":
         """Faults of channels that were seen."""
         return () if self._view is None else self._view.faults

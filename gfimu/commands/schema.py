@@ -1,68 +1,45 @@
-"""Under `gfimu schema`: the JSON schema of what each command prints with --json."""
+"""Print the JSON schema of what a command prints with --json: every key with its meaning and unit.
 
-from __future__ import annotations
+Examples
+--------
+gfimu schema estimate
+# Of a command of a command, to a file
+gfimu schema campaign table --out table.schema.json
+"""
 
-import importlib
-from typing import TYPE_CHECKING, Any
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
 
-from gfimu.files.outputs import JSON_SCHEMA, writes
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from pathlib import Path
+from gfimu.base.declared import Declared, figure, struct_of, structs_of
+from gfimu.base.errors import unknown_name
+from gfimu.base.files.outputs import JSON_SCHEMA
+from gfimu.base.files.schema import about
+from gfimu.commands.shell.completion import beginning
+from gfimu.commands.shell.declare import Option, command
 
 __all__ = ["schema", "schema_names"]
 
-_RESULTS: dict[str, tuple[str, ...]] = {
-    "benchmark judge": ("benchmarks.BenchmarkJudged",),
-    "benchmark list": ("benchmarks.BenchmarkListed",),
-    "benchmark run": ("benchmarks.BenchmarkRun",),
-    "benchmark table": ("benchmarks.BenchmarkJudged",),
-    "benchmark worlds": ("benchmarks.BenchmarkWorlds",),
-    "calibrate": ("calibrations.Calibrated",),
-    "campaign": ("campaigns.Campaign",),
-    "campaign plot": ("campaigns.CampaignPlot",),
-    "campaign status": ("campaigns.CampaignStatus",),
-    "campaign table": ("campaigns.CampaignTable",),
-    "certificate": (),
-    "check": ("diagnoses.Checked",),
-    "convert": ("recordings.Converted", "recordings.ConvertedArray", "recordings.ConvertedCalibration"),
-    "demo": ("first_steps.Demo",),
-    "design": ("diagnoses.Designed",),
-    "diagnose": ("diagnoses.Diagnosed", "diagnoses.Checked"),
-    "drift": (
-        "errors_of_arrays.Drift",
-        "errors_of_arrays.RestDrift",
-        "errors_of_arrays.EquivalentErrors",
-        "errors_of_arrays.AxisDrift",
-    ),
-    "estimate": ("motions.Estimated",),
-    "firmware build": ("firmware.Built",),
-    "firmware check": ("firmware.StrictChecked",),
-    "firmware faults": ("firmware.Faulted",),
-    "firmware run": ("firmware.FirmwareRecorded", "firmware.FirmwareServed"),
-    "firmware selftest": ("firmware.SelfTested",),
-    "firmware trace": ("firmware.Traced",),
-    "impact": ("motions.Impacted",),
-    "inspect": ("recordings.Inspected",),
-    "join": ("recordings.Joined",),
-    "list": ("first_steps.Listed",),
-    "live": ("motions.LiveSample", "motions.LiveFault", "motions.LiveEvent"),
-    "new": ("first_steps.Begun",),
-    "noise": ("calibrations.Noise",),
-    "optimize": ("geometries.Optimized", "geometries.Front"),
-    "record": ("recordings.Recorded", "recordings.BoardsFound"),
-    "schema": ("first_steps.Schema",),
-    "score": ("geometries.Scored",),
-    "show": ("first_steps.Shown",),
-    "simulate": ("recordings.Simulated",),
-    "tolerance": ("errors_of_arrays.Tolerated",),
-    "view": ("motions.Viewed",),
-}
-"""Structs of the result of each command, below `gfimu.commands.results`."""
+Files = Annotated[dict[str, str], about("Files and folders that were written, by what they are.")]
 
-_PARTS = {"score": ("geometries.ArrayScore", "shared.AxisBounds")}
-"""Structs that a result names by reference."""
+
+@dataclass(frozen=True)
+class Fault(Declared):
+    """Why a command ended."""
+
+    kind: Annotated[str, figure("Kind of the error; Interrupted after Ctrl-C or SIGTERM.")]
+    message: Annotated[str, figure("One line that names the file or value, and the remedy.")]
+    exit_code: Annotated[int, figure("2 bad input, 130 after Ctrl-C, 143 after SIGTERM, 1 anything else.")]
+
+
+@dataclass(frozen=True)
+class Failed(Declared):
+    """A command that ended with an error."""
+
+    error: Annotated[Fault, figure("The error.")]
+
 
 _DIALECT = "https://json-schema.org/draft/2020-12/schema"
 _STREAMS = {"live"}
@@ -71,24 +48,76 @@ _CERTIFICATE = "certificate"  # whose schema is published with its format
 
 def schema_names() -> tuple[str, ...]:
     """Return the commands whose results have a schema."""
-    return tuple(_RESULTS)
+    from gfimu.commands.shell.command_list import COMMANDS, declared_commands
+
+    return tuple(sorted(one.name for file in COMMANDS for one in declared_commands(file)))
 
 
-@writes(out=JSON_SCHEMA)
-def schema(command: str, *, out: str | Path | None = None) -> dict[str, Any]:
+def _kinds(name: str) -> tuple[list[Any], list[Any]]:
+    """Return the structs of what a command prints, and those that they name by reference only."""
+    from gfimu.commands.shell.command_list import declared_commands
+
+    declared = next(one for one in declared_commands(name.split(maxsplit=1)[0]) if one.name == name)
+    whole = [declared, *(part.__command__ for part in declared.parts)]
+    results = [(one, kind) for one in whole for kind in one.results()]
+    kinds, parts = [], []
+    for one, kind in results:
+        if not (isinstance(kind, type) and issubclass(kind, Declared)):
+            kinds.append(kind)
+            continue
+        root, *inner = structs_of(kind)
+        named = one.names_files(kind)
+        kinds.append(_with_files(root, always=len(one.results()) == 1) if named else root)
+        parts += [part for part in inner if part not in kinds]
+    return kinds, parts
+
+
+def _with_files(kind: Any, *, always: bool) -> Any:
+    """Return a struct with the key that the machine of commands adds: the files that were written.
+
+    A command of several results does not write with each, so that theirs may lack the key.
+    """
+    import msgspec
+
+    files = ("files", Files) if always else ("files", Files | msgspec.UnsetType, msgspec.UNSET)
+    more = {"__doc__": kind.__doc__}
+    return msgspec.defstruct(kind.__name__, [files], bases=(kind,), namespace=more, kw_only=True)
+
+
+def _offers(incomplete: str) -> list[tuple[str, str]]:
+    """Offer the commands whose results have a schema."""
+    return beginning(incomplete, dict.fromkeys(name.partition(" ")[0] for name in schema_names()))
+
+
+def _run(given: Mapping[str, Any], as_json: bool) -> None:
+    from gfimu.commands.shell.output import print_json, print_paths
+
+    content = schema(" ".join(given["command"]), out=given["out"])
+    if given["out"] is None or as_json:
+        print_json(content)
+    else:
+        print_paths([("schema", given["out"])])
+
+
+@command(run=_run, results=lambda: (dict[str, Any],))
+def schema(
+    command: Annotated[
+        str,
+        Option(
+            "Command: estimate, or campaign table.",
+            "COMMAND...",
+            kind=list[str],
+            argument=True,
+            offers=_offers,
+        ),
+    ],
+    *,
+    out: Annotated[
+        str | Path | None,
+        Option("JSON schema to write (.json); printed without it.", "FILE", kind=Path, writes=JSON_SCHEMA),
+    ] = None,
+) -> dict[str, Any]:
     """Return the JSON schema (2020-12) of a command's output with ``--json``, errors included.
-
-    Parameters
-    ----------
-    command : str
-        The command, such as ``estimate`` or ``campaign table``.
-    out : str or Path, optional
-        File to write, ``.json``.
-
-    Returns
-    -------
-    dict
-        The schema.
 
     Raises
     ------
@@ -99,22 +128,19 @@ def schema(command: str, *, out: str | Path | None = None) -> dict[str, Any]:
     --------
     >>> import gfimu
     >>> sorted(gfimu.schema("check")["$defs"])[:2]
-    ['Checked', 'CheckedEffect']
+    ['CheckedRun', 'EffectView']
     """
-    import json
-
     import msgspec
 
-    from gfimu.commands.results.base import Failed, Files
-    from gfimu.errors import unknown_name
-    from gfimu.files.atomic_file import write_text
+    from gfimu.base.files.atomic_file import write_text
 
     name = " ".join(command.split())
-    if name not in _RESULTS:
-        raise unknown_name("command", name, _RESULTS)
-    kinds = [_struct(one) for one in _RESULTS[name]]
-    parts = [_struct(one) for one in _PARTS.get(name, ())]
-    references, definitions = msgspec.json.schema_components([*kinds, Failed, *parts], ref_template="#/$defs/{name}")
+    if name not in schema_names():
+        raise unknown_name("command", name, schema_names())
+    kinds, parts = _kinds(name)
+    references, definitions = msgspec.json.schema_components(
+        [*kinds, struct_of(Failed), *parts], ref_template="#/$defs/{name}"
+    )
     found = list(references[: len(kinds) + 1])
     if name == _CERTIFICATE:
         found.insert(0, {"$ref": "#/$defs/Certificate"})
@@ -133,16 +159,9 @@ def schema(command: str, *, out: str | Path | None = None) -> dict[str, Any]:
     return content
 
 
-def _struct(path: str) -> Any:
-    module, _, name = path.rpartition(".")
-    return getattr(importlib.import_module(f"gfimu.commands.results.{module}"), name)
-
-
 def _certified(files: Mapping[str, Any]) -> dict[str, Any]:
     """Return the definitions of a certificate as the command prints it: with the files that were written."""
-    import json
-
-    from gfimu.certification.schema import certificate_schema
+    from gfimu.calibration.certificate.schema import certificate_schema
 
     definitions: dict[str, Any] = json.loads(certificate_schema())["$defs"]
     definitions["Certificate"]["properties"]["files"] = dict(files)

@@ -1,49 +1,60 @@
-"""Under `gfimu simulate`: a recording from a scenario."""
+"""Simulate a scenario on the MuJoCo turntable and write what the board would have recorded.
 
-from __future__ import annotations
+Examples
+--------
+gfimu simulate paper_run --out run.parquet --seed 1
+# Keys of the scenario changed
+gfimu simulate paper_run --out run.csv --set sensor.range_g=8 --set duration_s=5
+# With a picture for the rerun viewer
+gfimu simulate tumble --out tumble.parquet --rrd tumble.rrd
+"""
 
-from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-from gfimu.files.outputs import RECORDING, RERUN, writes
+from gfimu.base.errors import InputError
+from gfimu.commands.shell.declare import Option, command
+from gfimu.commands.shell.options import MAX_MEMORY, RECORDING_OUT, RRD, SCENARIO, SEED
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from gfimu.base.files.memory import MemorySize
     from gfimu.recording import Recording
     from sim.scenarios import Scenario
+    from sim.simulation import Simulated
 
 __all__ = ["simulate"]
 
 
-@writes(reads=("scenario",), out=RECORDING, rrd=RERUN)
-def simulate(
-    scenario: Scenario | str | Path,
-    *,
-    out: str | Path | None = None,
-    seed: int = 0,
-    changes: Sequence[str] = (),
-    raw: bool = False,
-    rrd: str | Path | None = None,
-    progress: Callable[[float], None] | None = None,
-) -> Recording:
-    """Simulate a scenario on the MuJoCo turntable and return what the board would have recorded.
+def _results() -> tuple[type, ...]:
+    from sim.simulation import Simulated
 
-    Parameters
-    ----------
-    scenario : Scenario, str or Path
-        The scenario, its name, or a scenario or twin file (.toml).
-    out : str or Path, optional
-        Recording to write, ``.csv`` or ``.parquet``.
-    seed : int
-        Seed of all random numbers.
-    changes : sequence of str
-        Changes to keys of the scenario file, such as ``"sensor.range_g=8"`` (``--set``).
-    raw : bool
-        Keep the readings as counts of the converter.
-    rrd : str or Path, optional
-        Rerun recording to write.
-    progress : callable, optional
-        Called with the share done, 0 to 1.
+    return (Simulated,)
+
+
+def _recording(simulated: "Simulated") -> "Recording":
+    return simulated.recording
+
+
+@command(results=_results, gives=_recording, doing=lambda given: f"simulating {given['scenario']}")
+def simulate(
+    scenario: Annotated["Scenario | str | Path", SCENARIO.also(" or a twin file", argument=True)],
+    *,
+    out: Annotated["str | Path | None", RECORDING_OUT.also(needed=True)] = None,
+    seed: Annotated[int, SEED] = 0,
+    changes: Annotated[
+        "Sequence[str]",
+        Option("Change a key of the scenario file; may be repeated.", "KEY=VALUE", name="--set", kind=list[str]),
+    ] = (),
+    raw: Annotated[bool, Option("Keep the readings as counts of the converter.")] = False,
+    max_memory: Annotated["MemorySize | None", MAX_MEMORY.also("; of the run, half of the machine's")] = None,
+    rrd: Annotated["str | Path | None", RRD] = None,
+    progress: Annotated[
+        "Callable[[float], None] | None", Option("Called with the share done, 0 to 1.", shell=False)
+    ] = None,
+) -> "Simulated":
+    """Simulate a scenario on the MuJoCo turntable and return what the board would have recorded.
 
     Returns
     -------
@@ -62,8 +73,9 @@ def simulate(
     >>> run.readings.shape
     (3000, 12)
     """
-    from gfimu.errors import InputError
+    from gfimu.base.files.memory import MemoryLimit, with_memory
     from sim.scenarios import Scenario
+    from sim.simulation import memory_of, summarise
     from sim.simulation import simulate as run_scenario
 
     if seed < 0:
@@ -74,13 +86,14 @@ def simulate(
         run = scenario
     else:
         run = Scenario.load(scenario, changes=changes)
+        MemoryLimit.of_work(with_memory(scenario, max_memory)).needs(memory_of(run))
     recording = run_scenario(run, seed=seed, out=out, raw=raw, progress=progress)
     if rrd is not None:
         _draw(rrd, run, recording)
-    return recording
+    return summarise(run, recording)
 
 
-def _draw(rrd: str | Path, run: Scenario, recording: Recording) -> None:
+def _draw(rrd: "str | Path", run: "Scenario", recording: "Recording") -> None:
     """Draw what was simulated: on its turntable, about a level or inclined axis, on a carriage, or free."""
     from dataclasses import replace
 
@@ -98,7 +111,7 @@ def _draw(rrd: str | Path, run: Scenario, recording: Recording) -> None:
     write_run(rrd, _in_si(recording), array, known=known, shapes=shapes, title=run.name)
 
 
-def _in_si(recording: Recording) -> Recording:
+def _in_si(recording: "Recording") -> "Recording":
     """Return the readings in m/s²."""
     from dataclasses import replace
 

@@ -1,223 +1,125 @@
-"""Under `gfimu tolerance`: what machining and chip tolerances of an array do to α, ω and position."""
+"""Budget the errors of α, ω and position from machining and chip tolerances: shares, simulated units.
 
-from __future__ import annotations
+Examples
+--------
+gfimu tolerance cube12 --position-mm 0.2 --angle-deg 0.5 --picture tolerance.png
+# Another part, without simulated units
+gfimu tolerance cube12 --closed-form --part adxl355 --calibrated poses+rest
+"""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
-from numpy.typing import NDArray
-
-from gfimu.commands.former_arguments import former_arguments
-from gfimu.errors import InputError
-from gfimu.files.outputs import PICTURE, writes
-from gfimu.results import Panel, PlottedResult, Series, text_column
+from gfimu.base.errors import InputError
+from gfimu.commands.shell import completion
+from gfimu.commands.shell.declare import Group, Option, command
+from gfimu.commands.shell.options import (
+    ARRAY,
+    BIAS_MG,
+    DURATION,
+    NOISE_UG,
+    PICTURE,
+    PROGRESS,
+    SCENARIO,
+    SEED,
+    SPEED_RAD_S,
+    WORKERS,
+)
 
 if TYPE_CHECKING:
-    from gfimu.commands.tolerance_units import UnitErrors
-    from gfimu.geometry.array import AccelerometerArray
-    from gfimu.tolerances.budget import ToleranceBudget
-    from gfimu.tolerances.calibrated import Poses
-    from gfimu.tolerances.comparison import Comparison
-    from gfimu.tolerances.tolerances import Tolerances
+    from gfimu.array.array import AccelerometerArray
+    from gfimu.budget.tolerances.calibrated import Poses
+    from gfimu.budget.tolerances.comparison import UnitErrors
+    from gfimu.budget.tolerances.result import ToleranceResult
+    from gfimu.budget.tolerances.tolerances import ChipErrors
     from sim.scenarios import Scenario
 
-__all__ = ["ToleranceResult", "tolerance"]
+__all__ = ["tolerance"]
 
-_FORMAT_VERSION = 1
 _LEAST_UNITS, _MOST_UNITS = 10, 100_000  # fewer have no spread to speak of; more take hours
 _USUAL_TIME_S = 3.0  # of the reference motion: a second at the rate, after rest and ramp
 _MOST_SAMPLES = 6000  # numerical: memory of the first-order maps, 1 GB with 24 channels
+_SHEET = "; else the data sheet's"
 
 
-@dataclass(frozen=True)
-class ToleranceResult(PlottedResult):
-    """Errors of an array from its tolerances, before and after a calibration.
+def _chip_errors(
+    bias_mg: Annotated[float | None, BIAS_MG.also(_SHEET)] = None,
+    gain_percent: Annotated[float | None, Option(f"Gain error, 1 σ, %{_SHEET}.")] = None,
+    cross_axis_percent: Annotated[
+        float | None, Option(f"Pick-up of each other axis of the chip, 1 σ, %{_SHEET}.")
+    ] = None,
+    nonlinearity_percent: Annotated[float | None, Option(f"Non-linearity at full scale, 1 σ, %{_SHEET}.")] = None,
+    noise_ug: Annotated[float | None, NOISE_UG.also(_SHEET)] = None,
+) -> "ChipErrors":
+    """Return the errors of the chips that the options of the shell state."""
+    from gfimu.base.units import MILLI_G
+    from gfimu.budget.tolerances.tolerances import ChipErrors
 
-    Parameters
-    ----------
-    array : str
-        Name of the array.
-    motion : str
-        What was simulated, in words.
-    levelled : bool
-        Whether estimates level themselves at the start; else attitude and rate are known there.
-    tolerances : Tolerances
-        What was assumed.
-    budgets : mapping of str to ToleranceBudget
-        First order, by calibration.
-    units : mapping of str to UnitErrors
-        Simulated units, by calibration; empty where none were asked for.
-    seed : int
-        Seed of the simulated units.
-
-    Examples
-    --------
-    >>> import gfimu
-    >>> found = gfimu.tolerance("cube12", closed_form=True)
-    >>> sorted(found.budgets)
-    ['none', 'poses', 'poses+rest', 'rest']
-    """
-
-    array: str
-    motion: str
-    levelled: bool
-    tolerances: Tolerances
-    budgets: Mapping[str, ToleranceBudget]
-    units: Mapping[str, UnitErrors]
-    seed: int
-
-    @cached_property
-    def comparisons(self) -> dict[str, dict[str, Comparison]]:
-        """Simulated units beside first order, by calibration and quantity."""
-        from gfimu.tolerances.comparison import compare
-
-        return {
-            calibration: {
-                name: compare(self.budgets[calibration].quantities[name], errors, self.tolerances.shape)
-                for name, errors in found.errors.items()
-            }
-            for calibration, found in self.units.items()
-        }
-
-    def to_columns(self) -> dict[str, NDArray[Any]]:
-        """Return one row per calibration, quantity and cause: the rms error it makes, its share of the variance."""
-        rows = [
-            (calibration, one, cause, size)
-            for calibration, budget in self.budgets.items()
-            for one in budget.quantities.values()
-            for cause, size in one.by_cause.items()
-        ]
-        return {
-            "calibration": text_column(calibration for calibration, _, _, _ in rows),
-            "quantity": text_column(one.name for _, one, _, _ in rows),
-            "cause": text_column(cause for _, _, cause, _ in rows),
-            "rms": np.array([size for _, _, _, size in rows], dtype=float),
-            "unit": text_column(one.unit for _, one, _, _ in rows),
-            "share": np.array([one.shares[cause] for _, one, cause, _ in rows], dtype=float),
-        }
-
-    def _heading(self) -> str:
-        return f"Tolerances of {self.array}"
-
-    def _facts(self) -> list[tuple[str, str]]:
-        facts = [("motion", self.motion)]
-        for calibration, budget in self.budgets.items():
-            sizes = "; ".join(f"{one.name} {one.rms:.3g} {one.unit}" for one in budget.quantities.values())
-            facts.append((f"errors, {calibration.replace('_', ' ')}", sizes))
-        return facts
-
-    def _panels(self) -> list[Panel]:
-        first = next(iter(self.budgets.values()))
-        panels = []
-        for name, quantity in first.quantities.items():
-            causes = tuple(dict.fromkeys(c for one in self.budgets.values() for c in one.quantities[name].by_cause))
-            series = tuple(
-                Series(key.replace("_", " "), np.array([one.quantities[name].by_cause.get(c, np.nan) for c in causes]))
-                for key, one in self.budgets.items()
-            )
-            title = f"error of {name.replace('_', ' ')}, by cause"
-            panels.append(Panel(title, f"rms, {quantity.unit}", series, causes, scale="log"))
-        return panels
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the content of ``gfimu tolerance --json``."""
-        from gfimu.tolerances.words import tolerance_figures
-
-        return {
-            "format_version": _FORMAT_VERSION,
-            "array": self.array,
-            "motion": self.motion,
-            "levelled_at_start": self.levelled,
-            "tolerances": tolerance_figures(self.tolerances),
-            "seed": self.seed,
-            "calibrations": {name: self._calibration(name) for name in self.budgets},
-        }
-
-    def _calibration(self, name: str) -> dict[str, Any]:
-        budget, units = self.budgets[name], self.units.get(name)
-        simulated = {} if units is None else self.comparisons[name]
-        return {
-            "attitude_error_rad": budget.attitude_rad,
-            "failed_units": {} if units is None else units.failures,
-            "quantities": {
-                key: one.to_dict() | ({"simulated": simulated[key].to_dict()} if key in simulated else {})
-                for key, one in budget.quantities.items()
-            },
-        }
+    return ChipErrors(
+        bias_m_s2=_scaled("--bias-mg", bias_mg, MILLI_G),
+        gain=_scaled("--gain-percent", gain_percent, 0.01),
+        cross_axis=_scaled("--cross-axis-percent", cross_axis_percent, 0.01),
+        nonlinearity=_scaled("--nonlinearity-percent", nonlinearity_percent, 0.01),
+        noise_m_s2_rthz=_scaled("--noise-ug", noise_ug, 1e-3 * MILLI_G),
+    )
 
 
-@former_arguments(time="duration", rate="speed_rad_s", placement_mm="position_mm", out="picture")
-@writes(reads=("array", "scenario"), picture=PICTURE)
+_CHIP = Group(
+    _chip_errors,
+    "Standard deviations of the errors of each channel, such as ``ChipErrors(bias_m_s2=0.1, gain=0.01)``; what it does "
+    "not state is the data sheet's.",
+)
+
+
+def _results() -> tuple[type, ...]:
+    from gfimu.budget.tolerances.result import ToleranceResult
+
+    return (ToleranceResult,)
+
+
+@command(results=_results, doing=lambda given: "" if given["closed_form"] else "simulating units")
 def tolerance(
-    array: AccelerometerArray | str | Path,
+    array: Annotated["AccelerometerArray | str | Path", ARRAY.also(", as drawn", argument=True)],
     *,
-    scenario: Scenario | str | Path | None = None,
-    duration: float | None = None,
-    speed_rad_s: float = 5.0,
-    position_mm: float = 0.2,
-    angle_deg: float = 0.5,
-    normal: bool = False,
-    part: str | None = None,
-    bias_mg: float | None = None,
-    gain_percent: float | None = None,
-    cross_axis_percent: float | None = None,
-    nonlinearity_percent: float | None = None,
-    noise_ug: float | None = None,
-    temperature_k: float = 5.0,
-    calibrated: Sequence[str] = (),
-    closed_form: bool = False,
-    units: int = 200,
-    seed: int = 0,
-    workers: int | None = None,
-    picture: str | Path | None = None,
-    progress: Callable[[int], object] | None = None,
-) -> ToleranceResult:
+    scenario: Annotated[
+        "Scenario | str | Path | None",
+        SCENARIO.also("; by default rest, then a spin about the vertical", when="Motion. "),
+    ] = None,
+    duration: Annotated[float | None, DURATION.also("; 3, or that of the scenario")] = None,
+    speed_rad_s: Annotated[float, SPEED_RAD_S.also(", of the default motion")] = 5.0,
+    position_mm: Annotated[float, Option("Limit ± of each chip's place along each axis, mm.", "MM")] = 0.2,
+    angle_deg: Annotated[float, Option("Limit ± of each chip's rotation about each axis, °.")] = 0.5,
+    normal: Annotated[
+        bool, Option("Limits are 3 σ of a normal distribution; else errors are uniform between them.")
+    ] = False,
+    part: Annotated[
+        str | None,
+        Option("Part of every chip, in place of those of the array.", "PART", offers=completion.parts),
+    ] = None,
+    chip: Annotated["ChipErrors | None", _CHIP] = None,
+    temperature_k: Annotated[float, Option("Temperature of the run less that of the calibration, K.")] = 5.0,
+    calibrated: Annotated[
+        Sequence[str],
+        Option(
+            "none, rest, poses or poses+rest; may be repeated; all that are possible by default.",
+            "NAME",
+            kind=list[str],
+            offers=completion.words("none", "rest", "poses", "poses+rest"),
+        ),
+    ] = (),
+    closed_form: Annotated[bool, Option("First order alone, without simulated units.")] = False,
+    units: Annotated[int, Option("Number of simulated units.")] = 200,
+    seed: Annotated[int, SEED] = 0,
+    workers: Annotated[int | None, WORKERS] = None,
+    picture: Annotated[str | Path | None, PICTURE] = None,
+    progress: Annotated[Callable[[float], object] | None, PROGRESS] = None,
+) -> "ToleranceResult":
     """Budget the errors of α, ω and position from machining and chip tolerances, and simulate units to compare.
 
-    Parameters
-    ----------
-    array : AccelerometerArray, str or Path
-        The array as drawn, its name or file.
-    scenario : Scenario, str or Path, optional
-        Motion: a scenario, its name or file; its array, sensors and effects are not used. By default the array rests
-        level for 1.5 s, is spun up about the vertical within 0.5 s, and turns on.
-    duration : float, optional
-        Length of the run, s; 3 s by default, or that of the scenario.
-    speed_rad_s : float
-        Angular rate of the default motion, rad/s.
-    position_mm : float
-        Limit of the position error of each chip along each axis, mm.
-    angle_deg : float
-        Limit of the rotation of each chip about each axis, °.
-    normal : bool
-        Take both limits for three standard deviations of a normal distribution; else errors are uniform between them.
-    part : str, optional
-        Part of every chip, in place of those of the array.
-    bias_mg, gain_percent, cross_axis_percent, nonlinearity_percent : float, optional
-        Standard deviations of each channel, mg and %; by default those of the parts' data sheets.
-    noise_ug : float, optional
-        White noise of each channel, one-sided density, µg/√Hz; by default the data sheets'.
-    temperature_k : float
-        Temperature of the run less that of the calibration, K.
-    calibrated : sequence of str
-        Calibrations, of none, rest, poses and poses+rest; all that the array and the motion allow by default.
-    closed_form : bool
-        First order alone, without simulated units.
-    units : int
-        Number of simulated units.
-    seed : int
-        Their seed.
-    workers : int, optional
-        Worker processes; by default as many as this process has processors. The result does not depend on it.
-    picture : str or Path, optional
-        Picture to write, ``.png``, ``.svg`` or ``.pdf``.
-    progress : callable, optional
-        Called with the number of simulated units done.
+    Of a scenario, array, sensors and effects are not used. The result does not depend on the number of workers.
 
     Raises
     ------
@@ -233,16 +135,16 @@ def tolerance(
     >>> found.budgets["poses+rest"].quantities["omega"].unit
     'rad/s'
     """
+    from gfimu.array.observability import require_all_motions
+    from gfimu.budget.tolerances.budget import tolerance_budget
+    from gfimu.budget.tolerances.calibrated import calibrations_of, check_calibration
+    from gfimu.budget.tolerances.propagation import error_maps
+    from gfimu.budget.tolerances.result import ToleranceResult
+    from gfimu.budget.tolerances.tolerances import Tolerances
     from gfimu.commands.opened import as_array
     from gfimu.commands.tolerance_units import UnitTask, simulate_units
-    from gfimu.geometry.observability import require_all_motions
-    from gfimu.tolerances.budget import tolerance_budget
-    from gfimu.tolerances.calibrated import calibrations_of, check_calibration
-    from gfimu.tolerances.propagation import error_maps
-    from gfimu.tolerances.tolerances import ChipErrors, Tolerances
-    from gfimu.units import MILLI_G
-    from sim.sweep.executors import processors
-    from sim.worlds.toleranced import known_motion_of
+    from sim.trials.sweep.executors import processors
+    from sim.trials.worlds.toleranced import known_motion_of
 
     _check("--position-mm", position_mm)
     _check("--angle-deg", angle_deg)
@@ -251,13 +153,6 @@ def tolerance(
         raise InputError(f"--units {units}: give {_LEAST_UNITS} to {_MOST_UNITS}, or --closed-form for none")
     if seed < 0 or (workers is not None and workers < 1):
         raise InputError(f"--seed {seed}, --workers {workers}: a seed is zero or positive, workers are 1 or more")
-    chip = ChipErrors(
-        bias_m_s2=_scaled("--bias-mg", bias_mg, MILLI_G),
-        gain=_scaled("--gain-percent", gain_percent, 0.01),
-        cross_axis=_scaled("--cross-axis-percent", cross_axis_percent, 0.01),
-        nonlinearity=_scaled("--nonlinearity-percent", nonlinearity_percent, 0.01),
-        noise_m_s2_rthz=_scaled("--noise-ug", noise_ug, 1e-3 * MILLI_G),
-    )
     drawn = as_array(array)
     if part is not None:
         drawn, name = drawn.with_part_file(part)
@@ -289,7 +184,7 @@ def tolerance(
     result = ToleranceResult(drawn.name, words, motion.levelled > 0, tolerances, budgets, simulated, seed)
     if picture is not None:
         errors = {name: found.errors for name, found in simulated.items()}
-        from gfimu.tolerances.picture import tolerance_picture
+        from gfimu.budget.tolerances.picture import tolerance_picture
 
         tolerance_picture(picture, budgets, errors, tolerances.shape, title=f"{drawn.name}: {words}")
     return result
@@ -307,11 +202,11 @@ def _scaled(option: str, value: float | None, unit: float) -> float | None:
 
 
 def _run(
-    array: AccelerometerArray, scenario: Scenario | str | Path | None, duration: float | None, speed_rad_s: float
-) -> tuple[Scenario, str]:
+    array: "AccelerometerArray", scenario: "Scenario | str | Path | None", duration: float | None, speed_rad_s: float
+) -> "tuple[Scenario, str]":
     """Return the run with the array as drawn and nothing wrong in it, and what it is in words."""
     from sim.scenarios import Scenario
-    from sim.worlds.toleranced import LEAST_TIME_S, REST_S, reference_motion
+    from sim.trials.worlds.toleranced import LEAST_TIME_S, REST_S, reference_motion
 
     if scenario is None:
         length = _USUAL_TIME_S if duration is None else duration
@@ -339,11 +234,11 @@ def _run(
     return run, words
 
 
-def _poses(run: Scenario) -> tuple[Scenario, Poses]:
+def _poses(run: "Scenario") -> "tuple[Scenario, Poses]":
     """Return the recording of a calibration from poses, and these poses for its prediction."""
     import numpy as np
 
-    from gfimu.tolerances.calibrated import Poses
+    from gfimu.budget.tolerances.calibrated import Poses
     from sim.motions.pose_sequence import POSE_SETS, PoseSequence
 
     sequence = PoseSequence()

@@ -4,26 +4,27 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.errors import GfimuError
-from gfimu.tolerances.budget import QUANTITIES
-from gfimu.tolerances.calibrated import uses_poses, uses_rest
+from gfimu.base.errors import GfimuError
+from gfimu.budget.tolerances.budget import QUANTITIES
+from gfimu.budget.tolerances.calibrated import uses_poses, uses_rest
+from gfimu.budget.tolerances.comparison import UnitErrors
 
 if TYPE_CHECKING:
-    from gfimu.geometry.array import AccelerometerArray
+    from gfimu.array.array import AccelerometerArray
+    from gfimu.budget.tolerances.known_motion import KnownMotion
+    from gfimu.budget.tolerances.tolerances import Tolerances
     from gfimu.motion.estimate import Estimate
     from gfimu.recording import Recording
-    from gfimu.tolerances.known_motion import KnownMotion
-    from gfimu.tolerances.tolerances import Tolerances
     from sim.scenarios import Scenario
-    from sim.worlds.toleranced import ToleranceUnit
+    from sim.trials.worlds.toleranced import ToleranceUnit
 
-__all__ = ["UnitErrors", "UnitTask", "simulate_units"]
+__all__ = ["UnitTask", "simulate_units"]
 
 Floats = NDArray[np.float64]
 
@@ -43,7 +44,7 @@ class UnitTask:
     tolerances : Tolerances
         What units are drawn from.
     calibrations : tuple of str
-        Keys of `gfimu.tolerances.calibrated.CALIBRATIONS`.
+        Keys of `gfimu.budget.tolerances.calibrated.CALIBRATIONS`.
     rates : bool
         Whether the null space determines ω.
     seed : int
@@ -58,28 +59,12 @@ class UnitTask:
     seed: int
 
 
-@dataclass(frozen=True)
-class UnitErrors:
-    """Errors of n simulated units after one calibration.
-
-    Parameters
-    ----------
-    errors : dict of str to ndarray, shape (n,)
-        By quantity (`gfimu.tolerances.budget.QUANTITIES`), the norm of the error of each unit; NaN of one that failed.
-    failures : dict of str to int
-        How many units could not be calibrated or estimated, by the reason.
-    """
-
-    errors: dict[str, Floats]
-    failures: dict[str, int] = field(default_factory=dict)
-
-
 _Row = dict[str, dict[str, float] | str]
 """Of one unit: by calibration the errors by quantity, or why there are none."""
 
 
 def simulate_units(
-    task: UnitTask, count: int, workers: int, *, progress: Callable[[int], object] | None = None
+    task: UnitTask, count: int, workers: int, *, progress: Callable[[float], object] | None = None
 ) -> dict[str, UnitErrors]:
     """Simulate units and return their errors by calibration.
 
@@ -92,14 +77,14 @@ def simulate_units(
     workers : int
         Worker processes; with 1 all is done in this process. The result does not depend on it.
     progress : callable, optional
-        Called with the number of units done.
+        Called with the share of the units that is done.
     """
     batches = [range(first, min(first + _BATCH, count)) for first in range(0, count, _BATCH)]
     rows: list[_Row] = []
     for done in _batches(task, batches, min(workers, len(batches))):
         rows += done
         if progress is not None:
-            progress(len(rows))
+            progress(len(rows) / count)
     return {calibration: _gather([row[calibration] for row in rows]) for calibration in task.calibrations}
 
 
@@ -109,7 +94,7 @@ def _batches(task: UnitTask, batches: Sequence[range], workers: int) -> Iterator
         for batch in batches:
             yield unit_rows(task, batch)
         return
-    from sim.sweep.executors import open_workers
+    from sim.trials.sweep.executors import open_workers
 
     with open_workers(workers) as opened:
         yield from opened.executor.map(unit_rows, [task] * len(batches), batches)
@@ -130,7 +115,7 @@ def _gather(found: Sequence[dict[str, float] | str]) -> UnitErrors:
 def unit_rows(task: UnitTask, numbers: Sequence[int]) -> list[_Row]:
     """Simulate some units, given their numbers, and return the errors of each."""
     from sim.chips.adxl345 import SensorErrors
-    from sim.worlds.toleranced import ToleranceUnit, known_motion_of
+    from sim.trials.worlds.toleranced import ToleranceUnit, known_motion_of
 
     array = task.scenario.array
     motion = known_motion_of(task.scenario)
@@ -141,7 +126,7 @@ def unit_rows(task: UnitTask, numbers: Sequence[int]) -> list[_Row]:
 
 
 def _row(task: UnitTask, number: int, motion: KnownMotion, reference: Estimate) -> _Row:
-    from sim.worlds.toleranced import CALIBRATED_AT, draw_unit
+    from sim.trials.worlds.toleranced import CALIBRATED_AT, draw_unit
 
     # Streams of their own: which calibrations are asked for changes no unit.
     drawing, of_run, of_poses = (np.random.default_rng([task.seed, number, stream]) for stream in range(3))
@@ -223,8 +208,8 @@ def _estimated(run: Recording, array: AccelerometerArray, motion: KnownMotion) -
 
 def _null_space_rate(run: Recording, array: AccelerometerArray, motion: KnownMotion) -> Floats:
     """Rate from the null space at the samples that turn, (k, 3), rad/s; the sign is that of the true one."""
+    from gfimu.budget.tolerances.propagation import null_space_of
     from gfimu.rate.maximum_likelihood import rates_of_null_space
-    from gfimu.tolerances.propagation import null_space_of
 
     rows, sensitivity = null_space_of(array, motion)
     omega, _ = rates_of_null_space(run.readings[motion.turning] @ rows.T, sensitivity)

@@ -1,68 +1,98 @@
-"""Under `gfimu view`: a run in the rerun viewer."""
+"""Open a run in the rerun viewer: the rig in 3-D, raw channels, and the estimate over time.
 
-from __future__ import annotations
+A recording of readings is estimated first; its picture goes beside it as FILE.view.rrd.
 
-from collections.abc import Callable, Sequence
+Examples
+--------
+gfimu view run.parquet
+# Write the picture without opening it
+gfimu view run.parquet --out run.rrd
+# One chip on a table
+gfimu view run.csv --array arm.toml --axis z
+"""
+
+import inspect
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Any
 
-from gfimu.files.outputs import RERUN, check_outputs, writes
-from gfimu.optional_packages import require
+from gfimu.base.files.outputs import RERUN, check_outputs
+from gfimu.base.optional_packages import require
+from gfimu.commands.known_axis import AXIS_ALONE, AxisLike, as_known_axis
+from gfimu.commands.shell.declare import Option, command
+from gfimu.commands.shell.options import ARRAY, FORCE, MAP, MAX_MEMORY
 
 if TYPE_CHECKING:
+    from gfimu.array.array import AccelerometerArray
+    from gfimu.base.files.memory import MemorySize
     from gfimu.diagnosis.verdict.verdict import Diagnosis
-    from gfimu.geometry.array import AccelerometerArray
-    from gfimu.geometry.turning_axis import TurningAxis
-    from gfimu.importing import ColumnMap
     from gfimu.motion.estimate import Estimate
+    from gfimu.recording.importing import ColumnMap
     from gfimu.recording.mapped import RecordingLike
+    from gfimu.visual.picture import Viewed
 
 __all__ = ["view"]
 
 
-@writes(reads=("file", "array", "column_map"), out=RERUN)
+def _results() -> tuple[type, ...]:
+    from gfimu.visual.picture import Viewed
+
+    return (Viewed,)
+
+
+def _opened(viewed: "Viewed") -> Path:
+    """Open the picture where that is asked for, and return it."""
+    from gfimu.visual.viewer import open_viewer
+
+    if viewed.opens:
+        open_viewer(viewed.picture)
+    return viewed.picture
+
+
+def _show(given: Mapping[str, Any], as_json: bool) -> None:
+    """Name a picture before the viewer opens, which stays open as long as its user likes."""
+    from gfimu.commands.shell.output import print_json, print_paths, progress
+
+    with progress("making the picture"):
+        viewed = inspect.unwrap(view)(**given)
+    files = {"rerun recording": viewed.picture}
+    if not viewed.made:
+        _opened(viewed)
+    if as_json:
+        print_json({"files": files})
+    elif viewed.made:
+        print_paths(files.items())
+    if viewed.made:
+        _opened(viewed)
+
+
+@command(results=_results, gives=_opened, run=_show)
 def view(
-    file: RecordingLike | Estimate | Diagnosis,
+    file: Annotated[
+        "RecordingLike | Estimate | Diagnosis",
+        Option(
+            "A .rrd file, or a recording or estimate (.csv, .parquet, .bin) to make one from.",
+            "FILE",
+            kind=Path,
+            argument=True,
+            reads=True,
+        ),
+    ],
     *,
-    array: AccelerometerArray | str | Path | None = None,
-    column_map: ColumnMap | str | Path | None = None,
-    map_set: Sequence[str] = (),
-    axis: TurningAxis | str | Sequence[float] | None = None,
-    axis_point: Sequence[float] = (0.0, 0.0, 0.0),
-    hub: str = "fixed",
-    inclination_rad: float | None = None,
-    out: str | Path | None = None,
-    force: bool = False,
-    on_picture: Callable[[Path], None] | None = None,
-) -> Path:
+    array: Annotated["AccelerometerArray | str | Path | None", ARRAY.also("; else the recording's own")] = None,
+    column_map: Annotated["ColumnMap | str | Path | None", MAP] = None,
+    max_memory: Annotated["MemorySize | None", MAX_MEMORY] = None,
+    axis: Annotated[AxisLike, AXIS_ALONE] = None,
+    out: Annotated[
+        "str | Path | None",
+        Option("Rerun recording to write (.rrd); the viewer is not opened.", kind=Path, writes=RERUN),
+    ] = None,
+    force: Annotated[bool, FORCE] = False,
+) -> "Viewed":
     """Open a run in the rerun viewer, or write it as a picture.
 
-    Parameters
-    ----------
-    file : path, Recording, Estimate, Diagnosis, table, or times (n,) with readings (n, c)
-        A ``.rrd`` file, or a recording, an estimate or a diagnosis to make one from. That goes beside a file as
-        ``FILE.view.rrd``, else into a temporary folder.
-    array : AccelerometerArray, str or Path, optional
-        The array, its name or file; the recording's own by default.
-    column_map : ColumnMap, str or Path, optional
-        What the columns of a foreign file are: a map, its name or TOML file (``--map``).
-    map_set : sequence of str
-        Keys of that map to set, such as ``"time.unit=ms"`` (``--map-set``); without a map they are all of it.
-    axis : TurningAxis, str or sequence of float, optional
-        The axis about which alone the array turns, body frame: x, y, z, or three numbers; by default the array's own,
-        where it can't see all six motions.
-    axis_point : sequence of float
-        A point of that axis, body frame, m.
-    hub : {"fixed", "free"}
-        Whether that axis stands still (a table) or moves with a body (a wheel).
-    inclination_rad : float, optional
-        Angle between that axis and the vertical, rad; estimated by default.
-    out : str or Path, optional
-        Write the ``.rrd`` here and don't open it.
-    force : bool
-        Go on, with a warning, where the checks of the recording would refuse it.
-    on_picture : callable, optional
-        Called with the rerun recording once it is written, before the viewer opens.
+    The picture of a file goes beside it as ``FILE.view.rrd``, that of a recording, an estimate or a diagnosis into a
+    temporary folder.
 
     Returns
     -------
@@ -83,38 +113,31 @@ def view(
     >>> gfimu.view(run, out="run.rrd")  # doctest: +SKIP
     """
     require("gfimu view", "rerun")
-    from gfimu.commands.known_axis import turning_axis
+    from gfimu.base.files.input_file import as_path
     from gfimu.commands.opened import as_array, as_source
     from gfimu.diagnosis.verdict.verdict import Diagnosis
     from gfimu.motion.estimate import Estimate
-    from gfimu.visual.picture import picture_of, picture_path
-    from gfimu.visual.viewer import open_viewer
+    from gfimu.visual.picture import Viewed, picture_of, picture_path
 
-    source = Path(file) if isinstance(file, str | Path) else None
+    source = as_path(file) if isinstance(file, str | Path) else None
     if source is not None and source.suffix == ".rrd" and out is None:
-        open_viewer(source)
-        return source
+        return Viewed(source, made=False)
     picture = picture_path(source) if out is None else Path(out)
     check_outputs([("out", picture, RERUN)], [] if source is None else [source])
     if isinstance(file, Diagnosis):
         _picture_of_diagnosis(picture, file)
     else:
         drawing = None if array is None else as_array(array)
-        picture_of(
-            file if isinstance(file, Estimate) else as_source(source or file, drawing, column_map, map_set),
-            picture,
-            array=drawing,
-            axis=turning_axis(axis, axis_point, hub, inclination_rad),
-            force=force,
+        run = (
+            file
+            if isinstance(file, Estimate)
+            else as_source(source or file, drawing, column_map, max_memory=max_memory)
         )
-    if on_picture is not None:
-        on_picture(picture)
-    if out is None:
-        open_viewer(picture)
-    return picture
+        picture_of(run, picture, array=drawing, axis=as_known_axis(axis).axis, force=force)
+    return Viewed(picture, opens=out is None)
 
 
-def _picture_of_diagnosis(path: Path, diagnosis: Diagnosis) -> None:
+def _picture_of_diagnosis(path: Path, diagnosis: "Diagnosis") -> None:
     from gfimu.commands.diagnose import drawn_rig
     from gfimu.diagnosis.report.picture import write_picture
 

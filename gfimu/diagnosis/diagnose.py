@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
+from gfimu.base.errors import InputError
 from gfimu.diagnosis.data.body.prepared import prepare_bodies
 from gfimu.diagnosis.data.prepared_runs import PreparedRuns
 from gfimu.diagnosis.fit.learn import predicted_by_reference
 from gfimu.diagnosis.fit.parallel import one_blas_thread
-from gfimu.diagnosis.one_library import LibraryDiagnosis, Report, stretches_of
+from gfimu.diagnosis.one_library import STAGES, WIDER, LibraryDiagnosis, Report, interrupted, stretches_of
 from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.verdict.library import LibraryRule, with_wider_library
+from gfimu.diagnosis.search.nuisance_models import Understanding
+from gfimu.diagnosis.time_limit import limited_to, unlimited, what_ended
+from gfimu.diagnosis.verdict.library import with_wider_library
 from gfimu.diagnosis.verdict.place import with_place
 from gfimu.diagnosis.verdict.sample_notes import with_sample_notes
 from gfimu.diagnosis.verdict.verdict import Diagnosis
-from gfimu.errors import InputError
-from gfimu.known_axis.axis_gyro import with_axis_gyro
+from gfimu.model.world_model import WorldModel
+from gfimu.rate.axis.axis_gyro import with_axis_gyro
 from gfimu.recording import Recording
 from gfimu.recording.carried_array import warn_of_other_array
 from gfimu.recording.timing.reference_times import reference_on_rows
-from gfimu.world_model import WorldModel
 
 __all__ = ["diagnose", "prepare"]
 
@@ -72,13 +74,14 @@ def diagnose(
     held_labels = [f"held-out run {number + 1}" for number in range(len(held_out))]
     for recording, label in zip((*recordings, *held_out), (*labels, *held_labels), strict=True):
         warn_of_other_array(recording.metadata, model.array, label)
-    with one_blas_thread():
+    with one_blas_thread(), limited_to(np.inf):
         settings = policy or Policy()
         if model.drive_source == "gyro":
             settings = settings.of_body()
         progress(0.02, "read")
-        prepared = prepare(recordings, model, labels, settings, force=force)
-        kept = prepare(held_out, model, held_labels, settings, force=force) if held_out else None
+        with unlimited():  # without the samples nothing is known
+            prepared = prepare(recordings, model, labels, settings, force=force)
+            kept = prepare(held_out, model, held_labels, settings, force=force) if held_out else None
         try:
             found = _by_stages(prepared, kept, model, settings, progress)
         except np.linalg.LinAlgError as error:
@@ -87,7 +90,11 @@ def diagnose(
                 f"{runs}: the equations of this run have no solution ({error}); are the readings and the reference of "
                 "the same run, in the units that the file says?"
             ) from error
-        found = with_place(found, stretches_of(model, prepared), prepared.runs, settings)
+        if not found.interrupted:
+            try:
+                found = with_place(found, stretches_of(model, prepared), prepared.runs, settings)
+            except KeyboardInterrupt as stop:
+                found = interrupted(found, STAGES[-1], what_ended(stop))
         return with_sample_notes(found, prepared.runs)
 
 
@@ -109,28 +116,55 @@ def prepare(
 def _by_stages(
     prepared: PreparedRuns, kept: PreparedRuns | None, model: WorldModel, policy: Policy, report: Report
 ) -> Diagnosis:
-    """Return the verdict by the usual library; where that holds no good answer, by the wider one if it has a better.
+    """Return the verdict by the usual library, or by the wider one where the evidence is for that.
 
-    What is rare is searched for only where the usual effects fail: it would compete with them everywhere else.
+    The wider library is searched where the usual one holds no answer, and where one of its effects is the more probable
+    in a linear world, its prior included.
     """
     wide = model.searching(wide=True)
-    is_wider = wide.families().keys() > model.families().keys()
-    end = 0.5 if is_wider else 1.0  # of the progress that is reported
+    further = wide.families().keys() - model.families().keys()
+    end = 0.5 if further else 1.0  # of the progress that is reported
     usual = LibraryDiagnosis(prepared, kept, model, policy, lambda share, text: report(end * share, text))
-    understanding = usual.understood()
-    if understanding.explanation.interrupted:
-        return usual.so_far(understanding)
-    found = usual.verdict(understanding)
-    if not is_wider or _worth(found) >= LibraryRule.enough:
+    found, understanding = _verdict(usual)
+    if found.interrupted or understanding is None or not further:
         return found
     wider = LibraryDiagnosis(
         prepared, kept, wide, policy, lambda share, text: report(end + (1.0 - end) * share, f"wider library: {text}")
     )
-    # The biases and the calibration are the same ones: a model of them that lost will not win beside rarer causes.
-    understanding = wider.understood({understanding.model})
-    other = found if understanding.explanation.interrupted else wider.verdict(understanding)
-    better = other.verdict != "nothing_found" and _worth(other) > _worth(found)
+    try:
+        least = policy.ambiguous - policy.worth_a_search
+        if found.verdict != "unknown" and wider.promise(understanding, further) < least:
+            return found
+        # The biases and the calibration are the same ones: a model of them that lost will not win beside rarer causes.
+        other, instead = _verdict(wider, {understanding.model})
+    except KeyboardInterrupt as stop:
+        return interrupted(found, WIDER, what_ended(stop))
+    if other.interrupted is not None:
+        return interrupted(found, WIDER, other.interrupted.by)
+    if other.verdict == "nothing_found" or instead is None:
+        return found
+    if "unknown" in (found.verdict, other.verdict):
+        better = _worth(other) > _worth(found)
+    else:  # what the gate withdrew has no evidence
+        better = any(cause.effect in further for cause in other.causes)
+        better &= instead.log_posterior - understanding.log_posterior > policy.ambiguous
     return with_wider_library(other) if better else found
+
+
+def _verdict(
+    library: LibraryDiagnosis, models: Collection[str] | None = None
+) -> tuple[Diagnosis, Understanding | None]:
+    """Return the verdict by a library, and what its search found; where it is interrupted what is known by then."""
+    understanding = None
+    try:
+        understanding = library.understood(models)
+        by = understanding.explanation.interrupted
+        if not by:
+            return library.verdict(understanding), understanding
+    except KeyboardInterrupt as stop:
+        by = what_ended(stop)
+    with unlimited():
+        return library.so_far(understanding, by), understanding
 
 
 def _worth(found: Diagnosis) -> float:

@@ -12,28 +12,34 @@ from gfimu.diagnosis.criticism.coincidence.bound_numbers import Coincidence, coi
 from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.criticism.holdout import Holdout, gate_gains, held_out_gain, other_recordings, split
 from gfimu.diagnosis.criticism.lack_of_fit import LackOfFit, lack_of_fit
+from gfimu.diagnosis.criticism.series_tests import NOTHING
 from gfimu.diagnosis.criticism.surrogate import surrogates
 from gfimu.diagnosis.data.body.stretch import BodyStretch, make_body_stretches
 from gfimu.diagnosis.data.prepared_runs import PreparedRuns
 from gfimu.diagnosis.data.stretch import Stretch, make_stretches
 from gfimu.diagnosis.fit.gauss_newton import Fit
+from gfimu.diagnosis.fit.learn import starting_point
 from gfimu.diagnosis.policy import Policy
+from gfimu.diagnosis.search.beam import Blocks, promise
 from gfimu.diagnosis.search.explain import Explanation, reduced
 from gfimu.diagnosis.search.long_run import understand_any_length
 from gfimu.diagnosis.search.nuisance_models import Understanding
+from gfimu.diagnosis.search.screening import screen
 from gfimu.diagnosis.verdict.conclude import Described, conclude, is_dominant, is_unknown, named_causes
 from gfimu.diagnosis.verdict.gate import impossible_sizes, judge, measurable
 from gfimu.diagnosis.verdict.library import LibraryEvidence, with_library
 from gfimu.diagnosis.verdict.naming import conflicting
-from gfimu.diagnosis.verdict.parts import NamedCause
+from gfimu.diagnosis.verdict.parts import Interrupted, NamedCause
 from gfimu.diagnosis.verdict.verdict import Diagnosis
-from gfimu.world_model import WorldModel, is_of_one_recording
+from gfimu.model.world_model import WorldModel, is_of_one_recording
 
-__all__ = ["LibraryDiagnosis", "Report", "stretches_of"]
+__all__ = ["STAGES", "WIDER", "LibraryDiagnosis", "Report", "interrupted", "stretches_of"]
 
 Report = Callable[[float, str], None]
 
-_INTERRUPTED = "the search was interrupted, leading by then and not yet compared with held-out data"
+WIDER = "wider library"
+STAGES = ("samples", "search", "lack of fit", "validation", WIDER, "place")
+"""Stages of a diagnosis in order, as an interrupted one lists them."""
 
 
 def stretches_of(model: WorldModel, prepared: PreparedRuns) -> tuple[Stretch, ...]:
@@ -61,6 +67,7 @@ class LibraryDiagnosis:
         self, prepared: PreparedRuns, kept: PreparedRuns | None, model: WorldModel, policy: Policy, report: Report
     ) -> None:
         self._prepared, self._kept, self._model, self._policy, self._report = prepared, kept, model, policy, report
+        self.stage = STAGES[1]
 
     def understood(self, models: Collection[str] | None = None) -> Understanding:
         """Return what a search finds, under some models of the nuisance parameters only or under all."""
@@ -69,10 +76,17 @@ class LibraryDiagnosis:
             stretches, self._policy, lambda share, text: progress(0.05 + 0.8 * share, text), models=models
         )
 
+    def promise(self, understanding: Understanding, others: Collection[str]) -> float:
+        """Return by how much sets with other effects are more probable than what was found, in a linear world, nats."""
+        stretches, best = stretches_of(self._model, self._prepared), understanding.explanation.best
+        blocks = Blocks(screen(stretches, best.point, only=others), self._policy)
+        return promise(blocks, best.causes, others, self._policy)
+
     def verdict(self, understanding: Understanding) -> Diagnosis:
         """Return the verdict on what a search found."""
         policy, progress = self._policy, self._report
-        progress(0.88, "lack of fit")
+        self.stage = STAGES[2]
+        progress(0.88, self.stage)
         understanding, left = self._apart_from_the_rest(understanding)
         withdrawn: list[str] = []
         bound = self._coincidence(understanding.explanation)
@@ -80,6 +94,7 @@ class LibraryDiagnosis:
             return self._described(understanding, left, withdrawn, bound.sentence)
         gain = Gain()
         if not is_dominant(understanding.explanation, left, policy):
+            self.stage = STAGES[3]
             progress(0.92, "hold out")
             try:
                 understanding, withdrawn = self._gated(understanding)
@@ -97,7 +112,8 @@ class LibraryDiagnosis:
                 self._prepared, understanding, left, Gain(), policy, withdrawn=withdrawn, refuted=refuted, unknown=True
             )
         fitted = understanding.explanation.best.names
-        refuted = judge(gain, found.residual, [one for one in found.causes if one.effect in fitted], policy).why
+        inferred = [one for one in found.causes if one.effect in fitted]
+        refuted = judge(gain, found.residual, inferred, policy, found.unexplained).why
         if refuted:
             return self._described(understanding, left, withdrawn, refuted)
         gained = measurable(gain)
@@ -105,17 +121,29 @@ class LibraryDiagnosis:
             found = conclude(self._prepared, understanding, left, gained, policy, withdrawn=withdrawn)
         return self._doubted(found, understanding.explanation)
 
-    def so_far(self, understanding: Understanding) -> Diagnosis:
-        """Return what a search that was interrupted had found: no verdict, as nothing was held out or criticised."""
-        explanation, policy = understanding.explanation, self._policy
+    def so_far(self, understanding: Understanding | None, by: str) -> Diagnosis:
+        """Return what was known when the diagnosis was interrupted: no verdict, as what leads was not criticised.
+
+        Parameters
+        ----------
+        understanding : Understanding, optional
+            What the search had found; None where it had not begun.
+        by : str
+            What interrupted it.
+        """
         self._report(1.0, "interrupted")
-        if not explanation.best.causes:
-            raise KeyboardInterrupt
-        leading = named_causes(explanation, explanation.best, policy)
-        found_so_far = f"{_INTERRUPTED}: {'; '.join(one.effect + _sizes(one) for one in leading)}"
-        left = self._left(explanation)
-        found = conclude(self._prepared, understanding, left, Gain(), policy, refuted=found_so_far, unknown=True)
-        return replace(found, sentences=(f"No verdict: {found_so_far}.", *found.sentences[1:]))
+        if understanding is None:
+            stretches = stretches_of(self._model, self._prepared)
+            none = Fit(starting_point(stretches, self._policy.knots), 0.0, 0.0, 0.0, np.zeros((0, 0)), np.zeros(0))
+            understanding = Understanding(Explanation(none, none, {}, (), None, stretches), None, 0.0, 0.0)
+        explanation = understanding.explanation
+        leading = named_causes(explanation, explanation.best, self._policy)
+        names = "; ".join(one.effect + _sizes(one) for one in leading)
+        known = f"leading by then, and not yet confirmed: {names}" if leading else "nothing was leading by then"
+        why = f"the {self.stage} was interrupted ({by}); {known}"
+        found = conclude(self._prepared, understanding, NOTHING, Gain(), self._policy, refuted=why, unknown=True)
+        words = (f"No verdict: {why}.", *found.sentences[1:])
+        return interrupted(replace(found, rivals=(), sentences=words), self.stage, by)
 
     def _doubted(self, found: Diagnosis, explanation: Explanation) -> Diagnosis:
         """Return a verdict whose probabilities include that the truth is outside the library."""
@@ -256,6 +284,14 @@ class LibraryDiagnosis:
             refuted=refuted,
             unknown=True,
         )
+
+
+def interrupted(found: Diagnosis, stage: str, by: str) -> Diagnosis:
+    """Return a diagnosis that was interrupted in a stage, with the stages that were done and those that were not."""
+    place = STAGES.index(stage)
+    done, missing = STAGES[:place], STAGES[place:]
+    words = (*found.sentences, f"Done: {', '.join(done)}. Not done: {', '.join(missing)}.")
+    return replace(found, sentences=words, interrupted=Interrupted(by, stage, done, missing))
 
 
 def _sizes(cause: NamedCause) -> str:

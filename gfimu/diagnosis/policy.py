@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gfimu.units import STANDARD_GRAVITY
+from gfimu.base.units import STANDARD_GRAVITY
 
 __all__ = ["Policy"]
 
@@ -123,9 +123,10 @@ class Policy:
         fit of the whole run.
     temperature : float
         Divisor of log posteriors [1]: the linear Gaussian model is never quite true. Set where it makes what was
-        hidden in the runs ``faint`` of `sim.study` the most likely.
+        hidden in the runs ``faint`` of `sim.trials.study` the most likely.
     most_certain : float
-        Largest probability that is reported [1]. Set by `sim.study`: of causes surer than this, 3 of 1000 were wrong.
+        Largest probability that is reported [1]. Set by `sim.trials.study`: of causes surer than this, 3 of 1000 were
+        wrong.
     free_body : bool
         Whether the thresholds are those of a free body, whose drive nothing is known of [1]. Set by `of_body`. What all
         its chips share then passes for specific force; an effect means nothing beside one that can do all it does; sets

@@ -1,1 +1,5 @@
-"""Motion of the body: estimation, attitude, navigation, what a rest at the start shows of the biases."""
+"""Motion of the body: what a recording says of rate, attitude, velocity and position.
+
+In: a recording, with a calibration if there is one.
+Out: `Estimate` with its covariances, attitude, navigation, an impact and its criteria (`impact`).
+"""

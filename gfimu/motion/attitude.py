@@ -21,8 +21,8 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from gfimu.errors import InputError, unknown_name
-from gfimu.rate.integration import integrate_samples
+from gfimu.array.integration import integrate_samples
+from gfimu.base.errors import InputError, unknown_name
 
 __all__ = [
     "ATTITUDE_METHODS",
@@ -134,7 +134,7 @@ def table_angle(
     angle0 : float
         Angle at the first valid sample, rad.
     method : str
-        As for `gfimu.rate.integration.integrate_rate`.
+        As for `gfimu.array.integration.integrate_rate`.
 
     Returns
     -------

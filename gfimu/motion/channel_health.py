@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.integrity.fault import ChannelFault, ChannelHealth, HealthCode
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.short_repr import short_repr
+from gfimu.rate.health.fault import ChannelFault, ChannelHealth, HealthCode
 from gfimu.rate.sensing import SensorErrors, step_of_readings
-from gfimu.short_repr import short_repr
 
 __all__ = ["UsedReadings", "stuck_readings", "watched_readings"]
 
@@ -120,7 +120,7 @@ def watched_readings(
         return used
     health = None
     if watch:
-        from gfimu.integrity.watch import watch_from_rest, watch_in_motion
+        from gfimu.rate.health.watch import watch_from_rest, watch_in_motion
 
         if not calibrated:
             errors = errors.with_part_gains(array)

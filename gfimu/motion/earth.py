@@ -19,10 +19,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from gfimu.errors import InputError
-from gfimu.geometry.gravity import EARTH_RATE
+from gfimu.array.gravity import EARTH_RATE
+from gfimu.base.errors import InputError
+from gfimu.base.short_repr import short_repr
 from gfimu.motion.attitude import from_rotation, to_rotation
-from gfimu.short_repr import short_repr
 
 __all__ = ["EarthRotation"]
 

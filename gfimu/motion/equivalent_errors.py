@@ -7,8 +7,8 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gfimu.errors import InputError
-from gfimu.units import STANDARD_GRAVITY
+from gfimu.base.errors import InputError
+from gfimu.base.units import STANDARD_GRAVITY
 
 __all__ = ["equivalent_p_bias", "equivalent_rate_drift"]
 

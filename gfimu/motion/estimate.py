@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.errors import InputError
-from gfimu.files.column_file import open_columns, write_columns
-from gfimu.files.table import ArrowStream
-from gfimu.geometry.array import OMEGA_PRODUCTS
+from gfimu.array.array import OMEGA_PRODUCTS
+from gfimu.base.errors import InputError
+from gfimu.base.files.column_file import open_columns, write_columns
+from gfimu.base.files.table import ArrowStream
+from gfimu.base.results import Panel, PlottedResult, Series, axis_series
+from gfimu.base.short_repr import joined, timing
 from gfimu.rate.result import undecided
-from gfimu.results import Panel, RunResult, Series, axis_series
-from gfimu.short_repr import joined, timing
 
 __all__ = ["FORMAT_VERSION", "Estimate"]
 
@@ -38,7 +38,7 @@ _VECTOR_COLUMNS: dict[str, tuple[str, ...]] = {
 
 
 @dataclass(frozen=True)
-class Estimate(RunResult):
+class Estimate(PlottedResult):
     """Motion of the body at each sample of a recording; NaN where it could not be estimated.
 
     Parameters
@@ -57,13 +57,13 @@ class Estimate(RunResult):
     angle : ndarray, shape (n,)
         Angle turned about the table's axis since the first sample, rad, not wrapped.
     omega_products, omega_products_std : ndarray, shape (n, 6)
-        Products of ω from the null space, in the order `gfimu.geometry.array.OMEGA_PRODUCTS`, and their standard
+        Products of ω from the null space, in the order `gfimu.array.array.OMEGA_PRODUCTS`, and their standard
         deviation, rad²/s²; NaN where the array doesn't see one.
     velocity, position : ndarray, shape (n, 3), optional
         Velocity, m/s, and position, m, of the body origin in the world, where asked for.
     health : mapping of str to ndarray, optional
         For each channel by name its health at each sample, shape (n,): 0 used, 1 excluded, 2 missing, 3 saturated,
-        4 stuck, 5 in doubt (`gfimu.integrity.fault.HealthCode`). None where the channels were not watched and all are
+        4 stuck, 5 in doubt (`gfimu.rate.health.fault.HealthCode`). None where the channels were not watched and all are
         used.
     sign_probability : ndarray, shape (n,), optional
         Probability that ``omega`` and not ``−omega`` is the rate; one half at rest. Where the method judges it.

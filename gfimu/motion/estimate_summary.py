@@ -3,152 +3,181 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
-from typing import Any
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.geometry.kinematics import null_space, omega_products
-from gfimu.geometry.observability import unseen_motions
+from gfimu.array.array import AccelerometerArray
+from gfimu.array.kinematics import null_space, omega_products
+from gfimu.array.observability import unseen_motions
+from gfimu.base.declared import Declared, Line, Table, cell, figure, figures, table
+from gfimu.base.short_repr import short_repr
+from gfimu.base.units import MILLI_G, STANDARD_GRAVITY
 from gfimu.motion.earth import EarthRotation
 from gfimu.motion.equivalent_errors import equivalent_p_bias, equivalent_rate_drift
 from gfimu.motion.estimate import Estimate
 from gfimu.motion.rest_bias import ForceAtRest, force_at_rest
+from gfimu.rate.axis.mounting_fit import FittedConstant, MountingFit
+from gfimu.rate.consistency import Consistency
+from gfimu.rate.disagreement import Disagreement
+from gfimu.rate.health.fault import ChannelHealth, FaultEntry
 from gfimu.recording import Recording
-from gfimu.short_repr import short_repr
-from gfimu.units import STANDARD_GRAVITY
 
 __all__ = ["Agreement", "EstimateSummary", "PositionSummary", "centripetal_agreement", "summarise"]
 
+Floats = NDArray[np.float64]
+_Figures = Mapping[str, Any] | None  # as the metadata of an estimate hold them
+
+_DRIFT = "equivalent drift of ω: 6 r/(g t³)"
+_EARTH = "Earth's horizontal rate, taken off"
+_STAYED = (
+    "The equivalent errors hold for a body that ends where it started: r is then all error. The drift is that of the "
+    "horizontal part."
+)
+_CENTRIPETAL = "centripetal terms against gyro"
 _AXES = ("x", "y", "z")
 _TURNING_RATE = 2.0
 
 
 @dataclass(frozen=True)
-class Agreement:
-    """How well the centripetal terms in the null space agree with a gyro.
+class Agreement(Declared):
+    """How well the centripetal terms in the null space agree with a gyro."""
 
-    Parameters
-    ----------
-    slope : float
-        Least-squares slope through the origin of measured against expected terms; 1 is perfect.
-    correlation : float
-        Correlation of the two.
-    samples : int
-        Samples used: those with a gyro reading, every channel, and the body turning.
-    """
-
-    slope: float
-    correlation: float
-    samples: int
+    slope: Annotated[
+        float,
+        figure("Slope of measured against expected terms; 1 is perfect.", head=f"{_CENTRIPETAL}, slope", form=".4f"),
+    ]
+    correlation: Annotated[float, figure("Correlation of the two.", head=f"{_CENTRIPETAL}, correlation", form=".4f")]
+    samples: Annotated[int, figure("Samples used: those with a gyro reading, every channel, and the body turning.")]
 
 
 @dataclass(frozen=True)
-class PositionSummary:
-    """Where navigation ends, and the constant errors that would explain it if the body had stayed where it was.
+class PositionSummary(Declared):
+    """Where navigation ends, and the constant errors that would explain it if the body had stayed where it was."""
 
-    Parameters
-    ----------
-    after_s : float
-        Time since the start of navigation, s.
-    position_m : ndarray, shape (3,)
-        Position of the body origin at the end, world axes, m.
-    equivalent_p_bias_m_s2 : ndarray, shape (3,)
-        Constant bias of p, world axes, m/s² (`gfimu.motion.equivalent_errors.equivalent_p_bias`).
-    equivalent_rate_drift_deg_h : float
-        Constant drift of the rate that explains the horizontal part, °/h
-        (`gfimu.motion.equivalent_errors.equivalent_rate_drift`).
-    earth_horizontal_rate_deg_h : float or None
-        Horizontal part of the Earth's rate at the place, °/h: the drift of a unit that does not take it into account.
-    """
+    after_s: Annotated[float, figure("Time since the start of navigation.", "s")]
+    position_m: Annotated[Floats, figure("Position at the end, world axes.", "m", head="position x y z")]
+    equivalent_p_bias_m_s2: Annotated[Floats, figure("Constant bias of p that explains it, world axes.", "m/s²")]
+    equivalent_rate_drift_deg_h: Annotated[
+        float, figure("Constant drift of the rate that explains the horizontal part.", "°/h", head=_DRIFT)
+    ]
+    earth_horizontal_rate_deg_h: Annotated[
+        float | None, figure("Horizontal part of the Earth's rate; null without a latitude.", "°/h", head=_EARTH)
+    ]
 
-    after_s: float
-    position_m: NDArray[np.float64]
-    equivalent_p_bias_m_s2: NDArray[np.float64]
-    equivalent_rate_drift_deg_h: float
-    earth_horizontal_rate_deg_h: float | None
+    def table(self) -> Table:
+        """Return it as people read it."""
+        shown = figures(f"Position in the world after {self.after_s:.4g} s", self, note=_STAYED)
+        place, *others = shown.rows
+        bias = ("equivalent bias of p, x y z: 2 r/t²", cell(self.equivalent_p_bias_m_s2 / MILLI_G), "mg")
+        return replace(shown, rows=[place, bias, *others])
 
 
 @dataclass(frozen=True)
-class EstimateSummary:
-    """Key figures of an estimate; unknown ones are NaN or None.
+class EstimateSummary(Declared):
+    """Key figures of an estimate; unknown ones are NaN or None."""
 
-    Parameters
-    ----------
-    array, method, form : str
-        What was estimated, and how.
-    samples, gaps, samples_without_estimate : int
-        Samples, places where samples are lost, and samples whose channels don't suffice.
-    duration_s, sample_rate_hz : float
-        Length and nominal rate of the recording.
-    p_rms_m_s2, alpha_rms_rad_s2, omega_rms_rad_s : ndarray, shape (3,)
-        Root mean squares by body axis.
-    omega_std_rad_s : ndarray, shape (3,)
-        Standard deviation of the rate at the last sample, by noise alone.
-    angle_rad : float
-        Angle turned about the table's axis at the last sample.
-    tacho_rmse_rad_s, gyro_rmse_rad_s : float or None
-        Root mean square difference of the rate from the tachometer and, over all three axes, from the gyro.
-    centripetal : Agreement or None
-        Centripetal terms against the gyro.
-    disagreement : mapping or None
-        How much more than stated the channels disagree: the figures of `gfimu.rate.disagreement.Disagreement`.
-    sign_undecided_samples : int or None
-        Samples whose rate has a sign that is not decided.
-    consistency : mapping or None
-        Of the filter's or smoother's innovations: the figures of `gfimu.rate.consistency.Consistency`.
-    mounting : mapping or None
-        About a known axis: constants of the mounting that were estimated (`gfimu.known_axis.mounting_fit`).
-    position : PositionSummary or None
-        Where navigation ends, where the position was asked for.
-    at_rest : ForceAtRest or None
-        Mean of p at the first rest less gravity, from the readings as recorded (calibrated where that was asked for).
-    health : mapping or None
-        Faults of channels that were found and left out (`gfimu.integrity.fault.ChannelHealth`), where it was looked.
-    faults : tuple of mapping
-        The same faults, an entry for each channel (`gfimu.integrity.fault.ChannelFault.entries`).
-    channels_left_out : tuple of str
-        Dead channels that the estimate goes without.
-    warnings : tuple of str
-        What the checks of the recording found, and an inconsistent filter.
-    """
-
-    array: str
-    method: str
-    form: str
-    samples: int
-    gaps: int
-    samples_without_estimate: int
-    duration_s: float
-    sample_rate_hz: float
-    p_rms_m_s2: NDArray[np.float64]
-    alpha_rms_rad_s2: NDArray[np.float64]
-    omega_rms_rad_s: NDArray[np.float64]
-    omega_std_rad_s: NDArray[np.float64]
-    angle_rad: float
-    tacho_rmse_rad_s: float | None
-    gyro_rmse_rad_s: float | None
-    centripetal: Agreement | None
-    disagreement: Mapping[str, Any] | None = None
-    sign_undecided_samples: int | None = None
-    consistency: Mapping[str, Any] | None = None
-    mounting: Mapping[str, Any] | None = None
-    position: PositionSummary | None = None
-    at_rest: ForceAtRest | None = None
-    health: Mapping[str, Any] | None = None
-    faults: tuple[Mapping[str, Any], ...] = ()
-    channels_left_out: tuple[str, ...] = ()
-    warnings: tuple[str, ...] = ()
+    array: Annotated[str, figure("Name of the array.")]
+    method: Annotated[str, figure("Method for the angular rate.")]
+    form: Annotated[str, figure("How readings turn into p and α.")]
+    samples: Annotated[int, figure("Samples.", head="samples")]
+    gaps: Annotated[int, figure("Places where samples are lost.", head="gaps")]
+    samples_without_estimate: Annotated[int, figure("Their channels don't suffice.", head="samples without estimate")]
+    duration_s: Annotated[float, figure("Length of the recording.", "s", head="duration")]
+    sample_rate_hz: Annotated[float, figure("Nominal sample rate.", "Hz", head="sample rate")]
+    p_rms_m_s2: Annotated[Floats, figure("Specific force of the origin, rms.", "m/s²", head="p, rms x y z")]
+    alpha_rms_rad_s2: Annotated[Floats, figure("Angular acceleration, rms.", "rad/s²", head="α, rms x y z")]
+    omega_rms_rad_s: Annotated[Floats, figure("Angular rate, rms.", "rad/s", head="ω, rms x y z")]
+    omega_std_rad_s: Annotated[
+        Floats, figure("Standard deviation of ω at the end, by noise alone.", "rad/s", head="σ of ω at the end, x y z")
+    ]
+    angle_rad: Annotated[
+        float, figure("Angle about the table's axis at the end.", "rad", head="angle at the end", form=".5g")
+    ]
+    tacho_rmse_rad_s: Annotated[
+        float | None,
+        figure("Rate against the tachometer, rms; null without one.", "rad/s", head="ω against tacho, rmse"),
+    ]
+    gyro_rmse_rad_s: Annotated[
+        float | None, figure("Rate against the gyro, rms; null without one.", "rad/s", head="ω against gyro, rmse")
+    ]
+    centripetal: Annotated[Agreement | None, figure("Centripetal terms against the gyro; null without one.")]
+    disagreement: Annotated[
+        _Figures, figure("Disagreement of the channels; null where it is not measured.", json=Disagreement | None)
+    ] = None
+    restarts: Annotated[int | None, figure("How often the filter started again; null of methods without a filter.")] = (
+        None
+    )
+    sign_undecided_samples: Annotated[
+        int | None, figure("Samples whose sign of the rate is not decided.", head="samples with undecided sign")
+    ] = None
+    consistency: Annotated[
+        _Figures, figure("Innovations against what the filter states; null without one.", json=Consistency | None)
+    ] = None
+    mounting: Annotated[
+        _Figures, figure("Constants of the mounting that were estimated; null: it is exact.", json=MountingFit | None)
+    ] = None
+    position: Annotated[PositionSummary | None, figure("Where navigation ends; null without --position.")] = None
+    at_rest: Annotated[ForceAtRest | None, figure("Specific force at the first rest; null without a rest.")] = None
+    health: Annotated[
+        _Figures, figure("Health of the channels; null of methods that do not watch it.", json=ChannelHealth | None)
+    ] = None
+    faults: Annotated[
+        tuple[Mapping[str, Any], ...], figure("Faults, an entry for each channel.", json=list[FaultEntry])
+    ] = ()
+    channels_left_out: Annotated[tuple[str, ...], figure("Dead channels that were not used.")] = ()
+    warnings: Annotated[tuple[str, ...], figure("What speaks against these figures.")] = ()
 
     __repr__ = short_repr
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the figures by name, for JSON."""
-        return asdict(self)
+    def shown(self) -> Iterator[Table | str | Line]:
+        """Yield the tables and sentences that people read."""
+        main = figures(f"{self.array}, method {self.method}, {self.form} form", self)
+        agreement = () if self.centripetal is None else figures("", self.centripetal).rows
+        yield replace(main, rows=[*main.rows, *agreement, *self._rows_of_the_filter(), *self._rows_of_the_channels()])
+        if self.at_rest is not None:
+            yield self.at_rest.table(has_tacho=self.tacho_rmse_rad_s is not None)
+        if self.position is not None:
+            yield self.position.table()
+        if self.mounting is not None:
+            yield table(
+                "Mounting, estimated with the rotation: corrections to the array file",
+                [FittedConstant(**constant) for constant in self.mounting["constants"]],
+                "name value std prior_std",
+                note="Units are in the names; rotations and levers in body axes.",
+            )
+            for line in self.mounting["undetermined_combinations_in_prior_std"]:
+                yield f"- not determined by these data (each in units of its prior std): {line}"
+        for warning in self.warnings:
+            yield Line(f"WARNING {warning}", "yellow")
+
+    def _rows_of_the_filter(self) -> Iterator[tuple[str, object, str]]:
+        if self.disagreement is not None:
+            share, times = self.disagreement["share"], self.disagreement["times"]
+            size = f"{times:.2g} times in {share:.0%} of the samples" if share else "below 2"
+            yield "noise measured, times the stated", size, ""
+        if self.restarts:
+            yield "filter started again", self.restarts, "times"
+        if self.consistency is not None:
+            nis, bound = self.consistency["nis"], self.consistency["bound"]
+            yield "innovations squared over stated (NIS)", f"{nis:.3f}", f"≤ {bound:.3f}"
+            yield "innovations", "consistent" if self.consistency["consistent"] else "INCONSISTENT", ""
+            if self.consistency["worst_channel"] is not None:
+                yield "channel that disagrees most", self.consistency["worst_channel"], ""
+
+    def _rows_of_the_channels(self) -> Iterator[tuple[str, object, str]]:
+        if self.health is not None:
+            faulty = dict.fromkeys(name for fault in self.health["faults"] for name in fault["channels"])
+            yield "channels that contradict the others", ", ".join(faulty) or "none", ""
+        stuck = dict.fromkeys(fault["channel"] for fault in self.faults if fault["kind"] == "stuck")
+        if stuck:
+            yield "channels stuck for a while", ", ".join(stuck), ""
+        if self.channels_left_out:
+            yield "channels left out", ", ".join(self.channels_left_out), ""
 
 
 def summarise(estimate: Estimate, recording: Recording, array: AccelerometerArray) -> EstimateSummary:
@@ -171,7 +200,9 @@ def summarise(estimate: Estimate, recording: Recording, array: AccelerometerArra
     >>> type(summary).__name__
     'EstimateSummary'
     """
-    known = np.isfinite(estimate.omega).all(axis=1) & np.isfinite(estimate.p).all(axis=1)
+    known = np.isfinite(estimate.omega).all(axis=1)
+    if np.isfinite(estimate.p).any():  # else the array is one that does not see p at all
+        known &= np.isfinite(estimate.p).all(axis=1)
     last = int(np.flatnonzero(known)[-1]) if known.any() else -1
     turning = estimate.metadata.get("turning_axis")
     upright = Rotation.from_rotvec(recording.mounting_rotvec).inv().apply([0.0, 0.0, 1.0])
@@ -197,6 +228,7 @@ def summarise(estimate: Estimate, recording: Recording, array: AccelerometerArra
         gyro_rmse_rad_s=None if gyro is None else _rms_difference(estimate.omega, gyro),
         centripetal=None if unseen_motions(array) else centripetal_agreement(recording, array),
         disagreement=estimate.metadata.get("disagreement"),
+        restarts=estimate.metadata.get("channels", {}).get("restarts"),
         sign_undecided_samples=estimate.metadata.get("sign_undecided_samples"),
         consistency=consistency,
         mounting=estimate.metadata.get("mounting"),

@@ -14,25 +14,26 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from gfimu import __version__
-from gfimu.errors import InputError
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.geometry.linear_solution import linear_solution
+from gfimu.array.array import AccelerometerArray
+from gfimu.array.linear_solution import linear_solution
+from gfimu.array.parts.part import white_noise_std
+from gfimu.base.errors import InputError
+from gfimu.base.units import STANDARD_GRAVITY
+from gfimu.base.version import __version__
 from gfimu.motion.attitude import from_rotation, integrate_attitude, table_angle, to_rotation
 from gfimu.motion.channel_health import UsedReadings, watched_readings
 from gfimu.motion.earth import EarthRotation
 from gfimu.motion.estimate import FORMAT_VERSION, Estimate
 from gfimu.motion.navigation import level, navigate
 from gfimu.motion.rest_navigation import navigate_with_rest
-from gfimu.parts.part import white_noise_std
 from gfimu.rate.problem import RateProblem
 from gfimu.rate.registry import rate_method
+from gfimu.rate.sensing import calibrated_bias_std
 from gfimu.rate.solve import solve_rate
 from gfimu.recording import Recording
 from gfimu.recording.carried_array import array_metadata
 from gfimu.recording.checks import Finding, check_recording, refuse_or_warn, without_dead_channels
 from gfimu.recording.clipping import without_clipped
-from gfimu.units import STANDARD_GRAVITY
 
 __all__ = ["Estimate", "estimate"]
 
@@ -69,7 +70,7 @@ def estimate(
     method : str
         Method for the angular rate, a key of `gfimu.rate.registry.RATE_METHODS`.
     form : {"auto", "linear", "joint", "recursive"}
-        How readings turn into α and p; see `gfimu.geometry.linear_solution`.
+        How readings turn into α and p; see `gfimu.array.linear_solution`.
     omega0 : array_like, shape (3,), or None
         Angular rate at the first sample, body axes, rad/s; None if it isn't known (``filter`` and ``smoother`` only).
     quaternion0 : array_like, shape (4,), optional
@@ -90,7 +91,7 @@ def estimate(
         Whether to go on with a recording that its checks refuse; what they found is kept as a warning.
     keep_faulty : bool
         Use every channel, without looking for faulty ones. By default ``filter`` and ``smoother`` leave out channels
-        that contradict the others, while they do so (`gfimu.integrity`): from the first sample after a rest, else
+        that contradict the others, while they do so (`gfimu.rate.health`): from the first sample after a rest, else
         from when the rate has settled.
     findings : sequence of Finding, optional
         What `gfimu.recording.checks.check_recording` found, if it was run already.
@@ -144,7 +145,8 @@ def estimate(
 
     gyro = _gyro(recording) if fuse_gyro else None
     temperature = recording.reference.get("temperature_degC")
-    problem = RateProblem(array, recording.t_s, readings, noise, linear, rate0, gyro, temperature, progress)
+    bias = calibrated_bias_std(recording.metadata, array)
+    problem = RateProblem(array, recording.t_s, readings, noise, bias, linear, rate0, gyro, temperature, progress)
     dead = [name for finding in found if finding.kind == "dead" for name in finding.channels]
     if earth is not None and rate0 is not None and not rate0.any():  # at rest a body turns with the Earth
         first = _initial_attitude(recording, linear.motion, np.zeros((len(readings), 3)), quaternion0)

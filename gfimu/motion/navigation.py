@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from gfimu.errors import InputError
+from gfimu.array.integration import integrate_samples
+from gfimu.base.errors import InputError
+from gfimu.base.short_repr import short_repr
+from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.motion.attitude import from_rotation, to_rotation
 from gfimu.motion.earth import EarthRotation
-from gfimu.rate.integration import integrate_samples
-from gfimu.short_repr import short_repr
-from gfimu.units import STANDARD_GRAVITY
 
 __all__ = ["NavigationResult", "level", "navigate"]
 
@@ -115,7 +115,7 @@ def navigate(
     earth : EarthRotation, optional
         The Earth's rotation at the place; its Coriolis acceleration is left out by default.
     method : str
-        Quadrature, as for `gfimu.rate.integration.integrate_rate`.
+        Quadrature, as for `gfimu.array.integration.integrate_rate`.
 
     Returns
     -------

@@ -9,26 +9,28 @@ and it grows into the rate with time; `RestBias.rate_std` says how much.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from gfimu.errors import InputError
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.geometry.kinematics import specific_force
+from gfimu.array.array import AccelerometerArray
+from gfimu.array.kinematics import specific_force
+from gfimu.array.parts.limits import PartLimits
+from gfimu.base.declared import Declared, Table, figure
+from gfimu.base.errors import InputError
+from gfimu.base.short_repr import short_repr
+from gfimu.base.units import MILLI_G, STANDARD_GRAVITY
 from gfimu.motion.estimate import Estimate
 from gfimu.motion.estimation import estimate
-from gfimu.parts.limits import PartLimits
 from gfimu.rate.registry import rate_method
 from gfimu.recording import Recording
 from gfimu.recording.checks import Finding, check_recording, refuse_or_warn, without_dead_channels
 from gfimu.recording.rest import Rest, detect_rest, mean_variance_factor
-from gfimu.short_repr import short_repr
-from gfimu.units import MILLI_G, STANDARD_GRAVITY
 
 __all__ = ["ForceAtRest", "RestBias", "estimate_from_rest", "force_at_rest", "rest_bias"]
 
@@ -96,33 +98,41 @@ class RestBias:
 
 
 @dataclass(frozen=True)
-class ForceAtRest:
-    """Specific force p of the body origin at rest, less gravity: Table 1 of the GF-IMU paper.
+class ForceAtRest(Declared):
+    """Specific force p of the body origin at rest, less gravity: Table 1 of the GF-IMU paper."""
 
-    Parameters
-    ----------
-    start_s, stop_s : float
-        The stretch of rest, s.
-    bias_mg : ndarray, shape (3,)
-        Mean of p less gravity, body axes, mg: the equivalent biases of p, if the unit stands level.
-    std_mg : ndarray, shape (3,)
-        Standard uncertainty of that mean by the noise of the stretch, mg.
-    lean_rad : float
-        Angle between p and the upright of the recording's mounting, rad: the lean that would make the part of
-        ``bias_mg`` across the upright.
-    magnitude_mg, magnitude_std_mg : float
-        |p| less gravity, which no lean makes, and its standard uncertainty, mg.
-    """
-
-    start_s: float
-    stop_s: float
-    bias_mg: NDArray[np.float64]
-    std_mg: NDArray[np.float64]
-    lean_rad: float
-    magnitude_mg: float
-    magnitude_std_mg: float
+    start_s: Annotated[float, figure("Start of the rest.", "s")]
+    stop_s: Annotated[float, figure("Its end.", "s")]
+    bias_mg: Annotated[
+        NDArray[np.float64],
+        figure("Mean of p less gravity, body axes: the equivalent biases of p, if the unit stands level.", "mg"),
+    ]
+    std_mg: Annotated[
+        NDArray[np.float64], figure("Standard uncertainty of that mean by the noise of the stretch.", "mg")
+    ]
+    lean_rad: Annotated[
+        float,
+        figure("Angle between p and the upright of the recording's mounting: the lean that reads the same.", "rad"),
+    ]
+    magnitude_mg: Annotated[float, figure("|p| less gravity, which no lean makes.", "mg")]
+    magnitude_std_mg: Annotated[float, figure("Its standard uncertainty.", "mg")]
 
     __repr__ = short_repr
+
+    def table(self, *, has_tacho: bool) -> Table:
+        """Return what p reads beyond gravity, and the lean that would read the same, as people read it."""
+        steady = "" if has_tacho else "Without a tachometer a steady spin may pass for one. "
+        return Table(
+            f"Equivalent biases of p, first rest ({self.start_s:.4g} to {self.stop_s:.4g} s), mg",
+            ("mean less gravity", "x", "y", "z", "magnitude"),
+            [
+                ("bias of p", *(f"{value:+.2f}" for value in (*self.bias_mg, self.magnitude_mg))),
+                ("standard uncertainty", *(f"{value:.2g}" for value in (*self.std_mg, self.magnitude_std_mg))),
+            ],
+            note="The first rest is the first stretch in which no reading varies beyond its noise. "
+            f"{steady}At rest a bias and a lean are one: a lean of {math.degrees(self.lean_rad):.2g}° reads the same "
+            "across the vertical. No lean makes the magnitude.",
+        )
 
 
 def force_at_rest(

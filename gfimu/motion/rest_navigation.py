@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from gfimu.errors import InputError
+from gfimu.base.errors import InputError
+from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.motion.attitude import from_rotation, to_rotation
 from gfimu.motion.earth import EarthRotation
 from gfimu.motion.navigation import NavigationResult, navigate
-from gfimu.units import STANDARD_GRAVITY
 
 __all__ = ["navigate_with_rest"]
 

@@ -1,6 +1,6 @@
-"""Angular rate from an accelerometer array: per sample, by a filter or a smoother, over a run or a stream.
+"""Angular rate from an accelerometer array: per sample, filtered or smoothed, over a run or a stream.
 
-From the lowest floor up: `sensing` (errors of the channels), `problem` and `result`, the recursions and their `kalman`
-filter, one file per method, `registry` (the methods by name), `methods` (one call for all), `solve` (for an estimate);
-`live` and `stream` for a stream.
+In: readings (n, c), an array, the errors of its channels (`sensing`).
+Out: `RateEstimate` with covariance; faulty channels (`health`), lower bounds (`bounds`), rotation about a known axis
+(`axis`). One file per method, by name in `registry`; `methods` has one call for all.
 """

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.array.array import AccelerometerArray
 from gfimu.rate.null_readings import null_readings
 from gfimu.rate.per_sample import KnownStart, per_sample_estimate
 from gfimu.rate.result import RateEstimate
@@ -28,7 +28,7 @@ def rate_from_products(products: ArrayLike) -> tuple[NDArray[np.float64], NDArra
     Parameters
     ----------
     products : array_like, shape (n, 6)
-        Products in the order `gfimu.geometry.array.OMEGA_PRODUCTS`, as measured one by one, rad²/s².
+        Products in the order `gfimu.array.array.OMEGA_PRODUCTS`, as measured one by one, rad²/s².
 
     Returns
     -------

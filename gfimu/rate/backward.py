@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from gfimu.rate.recursion_data import COMPILE
+from gfimu.base.compiled import compiled
 
 __all__ = ["backward"]
 
 
-@njit(**COMPILE)
+@compiled
 def backward(record, count, overshoot, adjoint, curvature, omega, covariance, first):  # type: ignore[no-untyped-def]
     """Run the smoother back over a recorded block of ``count`` samples (Bryson–Frazier form of Rauch–Tung–Striebel).
 

@@ -17,16 +17,17 @@ Where that bound is exceeded, the mean is found again by filtering with such err
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
-from gfimu.errors import InputError
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.parts.limits import PartLimits
+from gfimu.array.array import AccelerometerArray
+from gfimu.array.parts.limits import PartLimits
+from gfimu.base.declared import Declared, figure, plain
+from gfimu.base.errors import InputError
 from gfimu.rate.result import RateEstimate
 from gfimu.rate.sensing import ChannelTables, SensorErrors
 
@@ -42,56 +43,41 @@ _SETTLED = 0.5  # of the excess has to go with a channel that is named alone
 
 
 @dataclass(frozen=True)
-class Consistency:
+class Consistency(Declared):
     """How the innovations of a filter compare with what it states.
 
-    Parameters
-    ----------
-    nis : float
-        Mean normalised innovation squared per degree of freedom, over the run.
-    expected : float
-        What a right model gives: 1.
-    bound : float
-        Largest mean that noise and channels within their data sheets' typical deviations give, with a probability of
-        1 − ``false_alarm``.
-    noise_bound : float
-        The same of noise alone. A mean between the two says that the stated standard deviation is too small by about
-        √nis, and that a calibration would mend it.
-    worst_second, worst_second_bound : float
-        The mean over the second that exceeds its own bound most, and that bound; NaN without a whole second.
-    worst_second_at_s : float
-        Time at which it begins, s.
-    consistent : bool
-        Whether both means are within their bounds.
-    worst_channel : str or None
-        The channel without which the innovations shrink most, if they are inconsistent and that removes most of it.
-    nis_without_worst : float
-        The mean without it; NaN if none was looked for.
-    degrees_of_freedom : int
-        Combinations that were compared, over all samples.
-    false_alarm : float
-        Probability of calling a right model inconsistent, by each of the two tests.
+    A mean between the bound of the noise and the bound says that the stated standard deviation is too small by about
+    √nis, and that a calibration would mend it.
     """
 
-    nis: float
-    expected: float
-    bound: float
-    noise_bound: float
-    worst_second: float
-    worst_second_bound: float
-    worst_second_at_s: float
-    consistent: bool
-    worst_channel: str | None
-    nis_without_worst: float
-    degrees_of_freedom: int
-    false_alarm: float
+    nis: Annotated[float, figure("Mean normalised innovation squared per degree of freedom, over the run.")]
+    expected: Annotated[float, figure("What a right model gives: 1.")]
+    bound: Annotated[
+        float,
+        figure(
+            "Largest mean that noise and channels within their data sheets' typical deviations give, but for "
+            "false_alarm."
+        ),
+    ]
+    noise_bound: Annotated[float, figure("Largest mean that the noise alone gives.")]
+    worst_second: Annotated[
+        float, figure("The mean over the second that exceeds its own bound most; not known without a whole second.")
+    ]
+    worst_second_bound: Annotated[float, figure("Its bound.")]
+    worst_second_at_s: Annotated[float, figure("When that second begins.", "s")]
+    consistent: Annotated[bool, figure("Whether both means are within their bounds.")]
+    worst_channel: Annotated[
+        str | None, figure("Channel without which the innovations shrink most; null where none stands out.")
+    ]
+    nis_without_worst: Annotated[float, figure("The mean without it; not known if none was looked for.")]
+    degrees_of_freedom: Annotated[int, figure("Combinations that were compared, over all samples.")]
+    false_alarm: Annotated[
+        float, figure("Probability of calling a right model inconsistent, by each of the two tests.")
+    ]
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures by name, for JSON; None for those that are not known."""
-        return {
-            name: None if isinstance(value, float) and not np.isfinite(value) else value
-            for name, value in asdict(self).items()
-        }
+        return plain(super().to_dict())
 
 
 def judge_consistency(

@@ -21,15 +21,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
-from gfimu.rate.recursion_data import COMPILE
-from gfimu.short_repr import short_repr
+from gfimu.base.compiled import compiled
+from gfimu.base.declared import Declared, figure, plain
+from gfimu.base.short_repr import short_repr
 
 __all__ = [
     "Disagreement",
@@ -190,7 +190,7 @@ class MeasuredNoise:
         return np.asarray(self.scale[place] ** 2 - 1.0)
 
 
-@njit(**COMPILE)
+@compiled
 def _scale(sums, counts, keep, keep_long, prior, deviate, deviate_long, causal):  # type: ignore[no-untyped-def]
     """Scale of each sample from sums of squares (n,) and degrees of freedom (n,)."""
     n = len(sums)
@@ -236,7 +236,7 @@ def _scale(sums, counts, keep, keep_long, prior, deviate, deviate_long, causal):
     return scale
 
 
-@njit(**COMPILE)
+@compiled
 def _limit(freedom, deviate):  # type: ignore[no-untyped-def]
     """Quantile of χ²/ν for ν degrees of freedom, at a quantile of the normal distribution (Wilson & Hilferty)."""
     part = 2.0 / (9.0 * max(freedom, 0.5))
@@ -245,40 +245,23 @@ def _limit(freedom, deviate):  # type: ignore[no-untyped-def]
 
 
 @dataclass(frozen=True)
-class Disagreement:
-    """How much more the channels disagree than their stated noise, over a run.
+class Disagreement(Declared):
+    """How much more the channels disagree than their stated noise, over a run."""
 
-    Parameters
-    ----------
-    enlarged : bool
-        Whether standard deviations were multiplied by s̃ anywhere.
-    notable : bool
-        Whether s̃ exceeds 2 in a notable share of the samples.
-    share : float
-        Share of the samples in which it does.
-    times : float
-        Median of s̃ over those samples; 1 without any.
-    slow_times, fast_times : float
-        Median of s̃ in the slowest and the fastest third of the samples that turn; NaN where too few do.
-    slow_rad_s, fast_rad_s : float
-        Median speeds of these, rad/s.
-    """
-
-    enlarged: bool
-    notable: bool
-    share: float
-    times: float
-    slow_times: float
-    fast_times: float
-    slow_rad_s: float
-    fast_rad_s: float
+    enlarged: Annotated[bool, figure("Whether standard deviations were multiplied by s̃ anywhere.")]
+    notable: Annotated[bool, figure("Whether s̃ exceeds 2 in a notable share of the samples.")]
+    share: Annotated[float, figure("Share of the samples in which it does.")]
+    times: Annotated[float, figure("Median of s̃ over those samples; 1 without any.")]
+    slow_times: Annotated[
+        float, figure("Median of s̃ in the slowest third of the samples that turn; not known where too few do.")
+    ]
+    fast_times: Annotated[float, figure("Median of s̃ in the fastest third.")]
+    slow_rad_s: Annotated[float, figure("Median rate of the slowest third.", "rad/s")]
+    fast_rad_s: Annotated[float, figure("Median rate of the fastest third.", "rad/s")]
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures by name, for JSON; None for those that are not known."""
-        return {
-            name: None if isinstance(value, float) and not np.isfinite(value) else value
-            for name, value in vars(self).items()
-        }
+        return plain(super().to_dict())
 
     @classmethod
     def from_dict(cls, figures: Mapping[str, Any]) -> Disagreement:

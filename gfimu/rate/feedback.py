@@ -6,8 +6,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from gfimu.errors import InputError
-from gfimu.rate.quadrature import polynomial_weights
+from gfimu.array.quadrature import polynomial_weights
+from gfimu.base.errors import InputError
 
 __all__ = ["integrate_rate_recursively"]
 

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gfimu.errors import GeometryError, InputError
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.rate.kalman import FilterSettings, join, spread_rest
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import GeometryError, InputError
+from gfimu.rate.kalman import FilterSettings, join, plausible_start, spread_rest
 from gfimu.rate.live import LiveRateFilter
 from gfimu.rate.refinement import refined
 from gfimu.rate.result import RateEstimate
@@ -61,8 +61,8 @@ def filter_rate(
     GeometryError
         If the array can't see all six motions, or can't find an unknown start.
     """
-    chosen = settings or FilterSettings()
     times, rows = np.asarray(t, dtype=float), np.asarray(readings, dtype=float)
+    chosen = plausible_start(array, times, rows, errors, settings or FilterSettings())
 
     def run(with_settings: FilterSettings) -> RateEstimate:
         return run_filter(array, times, rows, errors, with_settings, gyro=gyro, progress=progress)[0]
@@ -94,7 +94,7 @@ def require_finite(array: AccelerometerArray, result: RateEstimate) -> None:
     GeometryError
         If the rate is not finite everywhere: the array leaves products of ω in α that its null space doesn't see.
     """
-    broken = ~np.isfinite(result.omega).all(axis=1)
+    broken = ~np.isfinite(result.omega).all(axis=1) & (result.channels.samples_without_rate == 0)
     if broken.any():
         raise GeometryError(
             f"the rate ran away at t = {result.t_s[int(np.argmax(broken))]:.4g} s: array {array.name!r} leaves "
@@ -130,6 +130,10 @@ def run_filter(
             tracks.append(join([first, last[0]]))
     if live.sign.state == "decided" and len(tracks) == 2:  # decided by the very last samples
         tracks = [tracks[live.winner]]
+    for hypothesis, track in zip(live.hypotheses, tracks, strict=True):
+        for begin, end in hypothesis.contradicted:
+            rows = (track.t >= begin) & (track.t <= end)
+            track.columns.omega[rows], track.columns.covariance[rows] = np.nan, np.nan
     results = [
         replace(hypothesis.estimate(track), sign=live.sign, rest=spread_rest(track.columns.rest, window))
         for hypothesis, track in zip(live.hypotheses, tracks, strict=True)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from numba import njit
 
-from gfimu.rate.quadrature import polynomial_weights
-from gfimu.rate.recursion_data import INNER
+from gfimu.array.quadrature import polynomial_weights
+from gfimu.base.compiled import INNER
 
 __all__ = ["interval_weights"]
 

@@ -12,18 +12,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gfimu.errors import InputError, unknown_name
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.array.array import AccelerometerArray
+from gfimu.array.quadrature import STENCILS, even_weights
+from gfimu.base.errors import InputError, unknown_name
 from gfimu.rate.backward import backward
 from gfimu.rate.disagreement import MeasuredNoise
+from gfimu.rate.guard import GUARD_S, Guard
 from gfimu.rate.preparation import prepare
-from gfimu.rate.quadrature import STENCILS, even_weights
 from gfimu.rate.recursion import forward
 from gfimu.rate.recursion_data import (
     BLOCK,
@@ -39,6 +40,7 @@ from gfimu.rate.recursion_data import (
 from gfimu.rate.rest_test import HISTORY_BLOCKS, KEPT_BLOCKS, RUN_BLOCKS, RestTest
 from gfimu.rate.result import ChannelReport, RateEstimate, SignDecision, full_covariance
 from gfimu.rate.sensing import ChannelTables, SensorErrors
+from gfimu.rate.start import START_S, contradicts_rest
 
 __all__ = [
     "QUADRATURES",
@@ -46,7 +48,9 @@ __all__ = [
     "FilterSettings",
     "KalmanRateFilter",
     "join",
+    "plausible_start",
     "spread_rest",
+    "unknown_std",
 ]
 
 QUADRATURES = {
@@ -57,6 +61,9 @@ QUADRATURES = {
 _CHUNK = 4096
 _SMOOTHER_BLOCK = 512
 _MOST_CHANNELS = 62
+_UNKNOWN_STD = 3.0  # of an unknown start, in units of the rate found there
+_LEAST_STD = 3.0  # rad/s
+_SIGNED = 10.0  # innovations squared by which the other sign must fit better: odds of 150 to 1
 _FORWARD_SHARE = 0.3  # of the smoother's time, for its progress
 
 
@@ -113,6 +120,26 @@ def join(parts: Sequence[FilterOutput]) -> FilterOutput:
     return FilterOutput(
         np.concatenate([part.t for part in parts]), RecursionOutput._make(np.concatenate(column) for column in columns)
     )
+
+
+def plausible_start(
+    array: AccelerometerArray,
+    t: NDArray[np.float64],
+    readings: NDArray[np.float64],
+    errors: SensorErrors,
+    settings: FilterSettings,
+) -> FilterSettings:
+    """Return the settings, with an unknown start where they say rest and the first readings can't be those of rest."""
+    fits = t.ndim == 1 and len(t) > 0 and readings.shape == (len(t), array.n_channels)  # else the method says so
+    at_rest = settings.rest is not None and settings.start_omega is not None and not np.any(settings.start_omega)
+    if not (fits and at_rest and contradicts_rest(array, readings[t < t[0] + START_S], errors)):
+        return settings
+    return replace(settings, start_omega=None)
+
+
+def unknown_std(omega: NDArray[np.float64]) -> float:
+    """Return the standard deviation, rad/s, to start with from a rate (3,), rad/s, that a single sample showed."""
+    return max(_UNKNOWN_STD * float(np.linalg.norm(omega)), _LEAST_STD)
 
 
 class KalmanRateFilter:
@@ -184,7 +211,10 @@ class KalmanRateFilter:
         )
         self.state = self._start()
         self._compiled_tables = self._tables()
-        self._history = points + 2 + HISTORY_BLOCKS * self._tuning.rest_window
+        self._guard = Guard(self.tables, errors)
+        self.guarded = self._guard.possible and not likelihood  # of two mirrored filters one is wrong
+        self._window = max(4, round(GUARD_S / period))
+        self._history = points + 2 + max(HISTORY_BLOCKS * self._tuning.rest_window, self._window)
         self._buffer = _buffer(capacity + self._history + points, c, d)
         self._received = 0  # rows of the buffer that hold samples
         self._done = 0  # rows of the buffer that are estimated
@@ -195,28 +225,40 @@ class KalmanRateFilter:
         self._tally = np.zeros((3, c), dtype=np.int64)
         self._blind = 0
         self._gaps = 0
+        self._rates = np.zeros((self._window, 3))  # of the samples of the guard's window so far
+        self._watched = 0  # how many these are
+        self._squares, self._freedom = 0.0, 0  # their innovations squared, and degrees of freedom of those
+        self._lost = False  # whether the last window's single samples showed no rate
+        self._unusable = 0
+        self.restarts = 0
+        self._restarted = -1  # row of the buffer
+        self.contradicted: list[tuple[float, float]] = []  # first and last time of samples with a wrong rate or none, s
         self._record = empty_record(0, *self._sizes)
-        self._kept: list[RecursionState] = []
+        self._kept: list[tuple[int, RecursionState, bool]] = []  # first sample, state before it, whether it starts anew
         self._taken_back: list[tuple[int, int]] = []  # rows of the buffer, from behind the last rest to its end's block
         self._last_time = -np.inf
         self.progress: Callable[[float], object] | None = None  # called with the share of a block done so far
 
     def _start(self) -> RecursionState:
         """State before the first sample."""
-        c, d, n = self.array.n_channels, self.tables.n_null, self._sizes[0]
         if self.settings.start_omega is None:
             raise InputError("a single filter needs a start; use LiveRateFilter or filter_rate for an unknown one")
+        return self._state_of(self.settings.start_omega, self.settings.start_std)
+
+    def _state_of(self, omega: NDArray[np.float64], std: float) -> RecursionState:
+        """State of a rate (3,) of this standard deviation, rad/s, with biases as uncertain as before the run."""
+        c, d, n = self.array.n_channels, self.tables.n_null, self._sizes[0]
         x = np.zeros(n)
-        x[:3] = self.settings.start_omega
+        x[:3] = omega
         covariance = np.zeros((n, n))
-        covariance[:3, :3] = np.eye(3) * self.settings.start_std**2
+        covariance[:3, :3] = np.eye(3) * std**2
         covariance[3 : 6 + d, 3 : 6 + d] = self.tables.bias_covariance(self.errors.bias_std)
         covariance[6 + d : n - 3, 6 + d : n - 3] = np.eye(n - 9 - d) * self.errors.gyro_bias_std**2
         rest = self.settings.rest
-        settles = np.array([rest is not None and not x.any() and self.settings.start_std <= rest.largest_rate_std])
-        counts = np.array([0, 0, 0, 0, 0, int(settles[0]), 0, 0, 0, 0, 0])  # a start at rest is rest to begin with
+        rests = rest is not None and not x.any() and std <= rest.largest_rate_std
+        counts = np.array([0, 0, 0, 0, 0, int(rests), 0, 0, 0, 0, 0, 0])  # a start at rest is rest to begin with
         return RecursionState(
-            x, covariance, np.zeros(5), np.zeros(3), counts, settles, x.copy(), covariance.copy(),
+            x, covariance, np.zeros(5), np.zeros(3), counts, np.zeros(d), x.copy(), covariance.copy(),
             np.zeros(c), np.zeros((RUN_BLOCKS, 3)), np.zeros((RUN_BLOCKS, 3)), np.zeros((RUN_BLOCKS, 3, 3)),
             np.zeros((KEPT_BLOCKS, n)), np.zeros((KEPT_BLOCKS, n, n)), np.zeros((KEPT_BLOCKS, 5)),
             np.zeros(KEPT_BLOCKS, dtype=np.int64),
@@ -226,7 +268,8 @@ class KalmanRateFilter:
         tables = self.tables
         return Tables(
             tables.alpha_bias, tables.alpha_leak, tables.alpha_noise, tables.null_sensitivity, tables.null_bias,
-            tables.null_count, tables.plain, tables.alpha_rows, tables.null_rows,
+            tables.null_count, tables.plain, tables.alpha_rows, tables.null_rows, tables.products, tables.square_seen,
+            tables.null_size,
         )  # fmt: skip
 
     @property
@@ -242,13 +285,14 @@ class KalmanRateFilter:
     @property
     def report(self) -> ChannelReport:
         """What was wrong with the channels so far."""
+        others = self._blind, self._gaps, self.restarts, self._unusable
         if not self._tally.any():
-            return ChannelReport(samples_without_alpha=self._blind, gaps=self._gaps)
+            return ChannelReport({}, {}, {}, *others)
         missing, saturated, stuck = (
             {name: int(count) for name, count in zip(self.array.channels, row, strict=True) if count}
             for row in self._tally
         )
-        return ChannelReport(missing, saturated, stuck, self._blind, self._gaps)
+        return ChannelReport(missing, saturated, stuck, *others)
 
     def push(self, t: ArrayLike, readings: ArrayLike, gyro: ArrayLike | None = None) -> FilterOutput:
         """Take one sample or a block and return the estimates that are ready.
@@ -309,8 +353,11 @@ class KalmanRateFilter:
         out, stamps = self._empty(len(times))
         while True:
             self._kept, self._taken_back = [], []
+            self._watched, self._squares, self._freedom, self._lost = 0, 0.0, 0, False
+            self._unusable, self.restarts, self._restarted = 0, 0, -1
+            self.contradicted = []
             for start in range(0, len(times), _SMOOTHER_BLOCK):
-                self._kept.append(self.state.copy())
+                self._kept.append((start, self.state.copy(), False))
                 self._advance(min(start + _SMOOTHER_BLOCK, len(times)), out, stamps, start, closing=True)
                 if self.progress is not None:
                     self.progress(_FORWARD_SHARE * min(1.0, (start + _SMOOTHER_BLOCK) / len(times)))
@@ -328,14 +375,18 @@ class KalmanRateFilter:
         adjoint, curvature = np.zeros(size), np.zeros((size, size))
         record = empty_record(_SMOOTHER_BLOCK, *self._sizes)
         ignored = empty_output(_SMOOTHER_BLOCK)
-        for number in range(len(self._kept) - 1, -1, -1):
-            first = number * _SMOOTHER_BLOCK
-            last = min(first + _SMOOTHER_BLOCK, n)
+        last = n
+        for first, state, anew in reversed(self._kept):
             forward(
-                self._buffer, first, last, n, self._compiled_tables, self._tuning, self._kept[number].copy(), ignored,
-                -first, record,
-            )  # fmt: skip
+                self._buffer, first, last, n, self._compiled_tables, self._tuning, state.copy(), ignored, -first, record
+            )
             backward(record, last - first, self._tuning.overshoot, adjoint, curvature, omega, covariance, first)
+            if anew:  # nothing of what was before goes on
+                adjoint[:], curvature[:] = 0.0, 0.0
+            last = first
+        for begin, end in self.contradicted:
+            rows = (self._buffer.t[:n] >= begin) & (self._buffer.t[:n] <= end)
+            omega[rows], covariance[rows] = np.nan, np.nan
         return omega, full_covariance(covariance)
 
     def _check_times(self, times: NDArray[np.float64]) -> None:
@@ -397,17 +448,110 @@ class KalmanRateFilter:
         if until <= self._done or (not closing and self._received < self._tuning.weights.shape[1]):
             return filled
         first, self._done = self._done, until
-        reached = first
-        while reached < until:
-            reached = forward(
-                self._buffer, reached, until, self._received, self._compiled_tables, self._tuning, self.state, out,
-                filled - first, self._record,
-            )  # fmt: skip
-            if self.state.counts[RETURN]:
-                self._take_back(reached, out, filled + reached - first - 1)
-        count = until - first
-        stamps[filled : filled + count] = self._buffer.t[first:until]
+        place = filled
+        while first < until:
+            reached = first
+            while reached < until:
+                reached = forward(
+                    self._buffer, reached, until, self._received, self._compiled_tables, self._tuning, self.state, out,
+                    place - first, self._record,
+                )  # fmt: skip
+                if self.state.counts[RETURN]:
+                    self._take_back(reached, out, place + reached - first - 1)
+            end = self._watch(first, until, out, place) if self.guarded else until
+            place, first = place + end - first, end
+        count = place - filled
+        stamps[filled : filled + count] = self._buffer.t[until - count : until]
         return filled + count
+
+    def _watch(self, first: int, until: int, out: RecursionOutput, place: int) -> int:
+        """Judge the windows that end in rows ``first`` to ``until`` of the buffer, whose estimates begin at ``place``.
+
+        Returns the row up to which the estimates stand: from there on the filter has started anew.
+        """
+        row = first
+        while row < until:
+            part = slice(place + row - first, place + min(until, row + self._window - self._watched) - first)
+            count = part.stop - part.start
+            self._rates[self._watched : self._watched + count] = out.omega[part]
+            if count == 1:  # one sample at a time: no array operations
+                self._squares += out.nis[part.start]
+                self._freedom += out.dof[part.start]
+            else:
+                self._squares += out.nis[part].sum()
+                self._freedom += out.dof[part].sum()
+            if self._lost:
+                out.omega[part], out.covariance[part] = np.nan, np.nan
+                self._mark(row, row + count)
+            row += count
+            self._watched += count
+            if self._watched < self._window:
+                break
+            again = self._judge(row, out, place + row - first - 1)
+            if again is not None:
+                return again
+        return until
+
+    def _judge(self, end: int, out: RecursionOutput, place: int) -> int | None:
+        """Judge the window before row ``end``, whose last estimate is at ``place``, and start anew where it must be.
+
+        Returns the row to go on from; None to go on as before.
+        """
+        begin = end - self._window
+        nis, freedom = float(self._squares), int(self._freedom)
+        self._watched, self._squares, self._freedom = 0, 0.0, 0
+        if not (self._lost or self._guard.suspects(nis, freedom)):
+            return None
+        data = self._buffer
+        found = self._guard.judge(
+            data.z[begin:end], data.channel_set[begin:end] == 0, self._rates, nis / max(freedom, 1)
+        )
+        if found is None:
+            return None
+        if not found.contradicted:
+            self._lost = False
+            return None
+        anew = found.first >= 0 and (self._tuning.live or begin + found.first > self._restarted)
+        first = begin + max(found.first, 0)
+        if self._lost and not anew:
+            return None
+        self._lost = not anew
+        self.restarts += anew
+        self._mark(begin, (end - 1 if anew else end) if self._tuning.live else (first if anew else end))
+        if anew:
+            self.state = self._state_of(self._signed(found.omega, first, end), unknown_std(found.omega))
+        if not self._tuning.live:
+            if not anew:
+                omega = np.nan_to_num(self._rates[0])
+                self.state = self._state_of(omega, unknown_std(omega))
+            self._restarted = first
+            self._kept = [kept for kept in self._kept if kept[0] < begin]
+            for row in sorted({begin, first}):  # what is between them joins neither side
+                self._kept.append((row, self.state.copy(), True))
+            return first
+        if anew:
+            self._filter_again(first, end, out, place)
+        return end if anew else None
+
+    def _signed(self, omega: NDArray[np.float64], first: int, end: int) -> NDArray[np.float64]:
+        """Return a rate (3,) at row ``first`` with the sign that fits the rows up to ``end`` better, or as before."""
+        sides = (1.0, -1.0) if not omega @ self._rates[0] < 0.0 else (-1.0, 1.0)
+        squares = []
+        for side in sides:
+            again = empty_output(end - first)
+            forward(
+                self._buffer, first, end, self._received, self._compiled_tables,
+                self._tuning._replace(rest_window=0), self._state_of(side * omega, unknown_std(omega)), again, -first,
+                self._record,
+            )  # fmt: skip
+            squares.append(float(again.nis.sum()))
+        return omega * sides[0 if squares[0] < squares[1] + _SIGNED else 1]
+
+    def _mark(self, first: int, last: int) -> None:
+        """Note that rows ``first`` to ``last − 1`` have no usable rate."""
+        if last > first:
+            self._unusable += last - first
+            self.contradicted.append((float(self._buffer.t[first]), float(self._buffer.t[last - 1])))
 
     def _take_back(self, reached: int, out: RecursionOutput, place: int) -> None:
         """Return to the state before the blocks in doubt and filter up to row ``reached`` again, without rest."""
@@ -419,9 +563,16 @@ class KalmanRateFilter:
         state.scalars[:] = state.past_scalars[kept]
         state.counts[SAMPLES] = state.past_samples[kept]
         state.counts[RETURN] = 0
-        again = empty_output(reached - first)
+        self._filter_again(first, reached, out, place)
+        if not self._tuning.live:
+            self._taken_back.append((first, reached))
+
+    def _filter_again(self, first: int, last: int, out: RecursionOutput, place: int) -> None:
+        """Filter rows ``first`` to ``last − 1`` again, without rest; the last estimate goes to ``place``."""
+        state = self.state
+        again = empty_output(last - first)
         forward(
-            self._buffer, first, reached, self._received, self._compiled_tables,
+            self._buffer, first, last, self._received, self._compiled_tables,
             self._tuning._replace(rest_window=0, likelihood=False), state, again, -first, self._record,
         )  # fmt: skip
         state.counts[BLOCK] = 0
@@ -429,8 +580,6 @@ class KalmanRateFilter:
         state.block_covariance[:] = state.covariance
         out.omega[place] = again.omega[-1]
         out.covariance[place] = again.covariance[-1]
-        if not self._tuning.live:
-            self._taken_back.append((first, reached))
 
     def _empty(self, n: int) -> tuple[RecursionOutput, NDArray[np.float64]]:
         return empty_output(n), np.empty(n)
@@ -452,7 +601,7 @@ class KalmanRateFilter:
             columns.nis,
             columns.dof,
             columns.rest,
-            sign or SignDecision(),
+            sign or (SignDecision("undecided", 0.0) if self.restarts else SignDecision()),
             mirrored,
             bias=self.state.x[3:-3].copy(),
             bias_covariance=self.state.covariance[3:-3, 3:-3].copy(),
@@ -470,7 +619,7 @@ def empty_output(n: int) -> RecursionOutput:
 
 def empty_record(length: int, n: int, null_axes: int, gyro_axes: int) -> Record:
     """Record for the backward pass over ``length`` samples of a state of size ``n``."""
-    updates = 2 * null_axes + gyro_axes + 3
+    updates = 2 * null_axes + gyro_axes + 6
     return Record(
         np.empty((length, 3)), np.empty((length, 3, n)), np.empty((length, 3, n)), np.empty(length, dtype=np.int64),
         np.empty((length, updates, n)), np.empty((length, updates, n)), np.empty((length, updates)),

@@ -5,22 +5,35 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gfimu.errors import InputError
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.rate.kalman import FilterOutput, FilterSettings, KalmanRateFilter, empty_output, join
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import InputError
+from gfimu.rate.kalman import FilterOutput, FilterSettings, KalmanRateFilter, empty_output, join, unknown_std
 from gfimu.rate.live_accuracy import LiveAccuracy
 from gfimu.rate.result import ChannelReport, RateEstimate, SignDecision, full_covariance
 from gfimu.rate.sensing import SensorErrors
 from gfimu.rate.sign import InitialRate, SignTest
+from gfimu.rate.start import START_S, contradicts_rest
 
 __all__ = ["LiveRateFilter"]
 
-_UNKNOWN_STD = 3.0  # of an unknown start, in units of the rate found there
-_LEAST_STD = 3.0  # rad/s
+
+class _Samples(NamedTuple):
+    """Samples as they came."""
+
+    t: NDArray[np.float64]  # (n,)
+    readings: NDArray[np.float64]  # (n, c)
+    gyro: NDArray[np.float64] | None  # (n, 3)
+
+    @classmethod
+    def joined(cls, parts: list[_Samples]) -> _Samples:
+        """Join consecutive ones."""
+        gyro = None if parts[0].gyro is None else np.concatenate([part.gyro for part in parts if part.gyro is not None])
+        return cls(np.concatenate([part.t for part in parts]), np.concatenate([part.readings for part in parts]), gyro)
 
 
 class LiveRateFilter:
@@ -77,10 +90,12 @@ class LiveRateFilter:
         self.started_at_s = np.nan
         # A start at rest that doesn't look like rest leaves the sign in doubt: the bias of α was not learned.
         self._unproven = 0
+        self._first: list[_Samples] = []  # of a start at rest, until they show whether it is one
+        self._tried = True
         if self.settings.start_omega is not None:
             rest = self.settings.rest
             if rest is not None and not np.any(self.settings.start_omega):
-                self._unproven = rest.window(period)
+                self._unproven, self._tried = rest.window(period), False
             self.hypotheses = [KalmanRateFilter(array, errors, period, self.settings, gyro=gyro)]
             self.hypotheses[0].progress = progress
         else:
@@ -161,6 +176,13 @@ class LiveRateFilter:
         times = np.atleast_1d(np.asarray(t, dtype=float))
         rows = np.atleast_2d(np.asarray(readings, dtype=float))
         turning = None if gyro is None else np.atleast_2d(np.asarray(gyro, dtype=float))
+        if not self._tried and len(times) and rows.shape == (len(times), self.array.n_channels):
+            emitted = self._try(times, rows, turning)
+            if emitted is not None:
+                times, rows, turning = _Samples.joined(self._first)
+                outputs, place = self.push_raw(times, rows, turning)
+                shown = [output.rows(slice(emitted, None)) for output in outputs]
+                return shown, None if place is None else max(0, place - emitted)
         if self.hypotheses:
             return self._judge([hypothesis.push(times, rows, turning) for hypothesis in self.hypotheses])
         waiting, first = self._wait(times, rows)
@@ -169,6 +191,26 @@ class LiveRateFilter:
             for hypothesis in self.hypotheses
         ]
         return self._judge(outputs) if outputs else ([waiting], None)
+
+    def _try(self, t: NDArray[np.float64], rows: NDArray[np.float64], gyro: NDArray[np.float64] | None) -> int | None:
+        """See by the first readings whether a start at rest can be one.
+
+        If it can't, the filter starts anew, in the dark: returned is of how many samples estimates were given before.
+        """
+        before = sum(len(part.t) for part in self._first)
+        self._first.append(_Samples(t, rows, gyro))
+        started = self._first[0].t[0]
+        if t[-1] < started + START_S:
+            return None
+        self._tried = True
+        first = _Samples.joined(self._first)
+        if not contradicts_rest(self.array, first.readings[first.t < started + START_S], self.errors):
+            self._first = []
+            return None
+        lag = self.hypotheses[0].lag
+        self.settings, self.hypotheses, self._unproven = replace(self.settings, start_omega=None), [], 0
+        self._sign, self._initial = SignDecision("undecided", 0.0), InitialRate(self.array, self.errors)
+        return max(0, before - lag)
 
     def finish_raw(self) -> tuple[list[FilterOutput], int | None]:
         """Like `finish`, with the outputs of all hypotheses, and the sample that decided if one did."""
@@ -201,7 +243,7 @@ class LiveRateFilter:
 
     def _begin(self, found: NDArray[np.float64]) -> None:
         """Start both hypotheses."""
-        std = max(_UNKNOWN_STD * float(np.linalg.norm(found)), _LEAST_STD)
+        std = unknown_std(found)
         for sign in (1.0, -1.0):
             start = replace(self.settings, start_omega=sign * found, start_std=std)
             self.hypotheses.append(
@@ -213,6 +255,8 @@ class LiveRateFilter:
         """Compare the hypotheses; once decided, drop the loser."""
         if len(outputs) < 2:
             self._prove(outputs[0].columns.rest)
+            if self.current.restarts:
+                self._sign = SignDecision("undecided", 0.0)
             return outputs, None
         place = self._test.update(outputs[0].columns, outputs[1].columns)
         ratio = self._test.log_likelihood_ratio
@@ -221,6 +265,7 @@ class LiveRateFilter:
         else:
             self._sign = SignDecision("decided", abs(ratio), float(outputs[0].t[place]))
             self.hypotheses = [self.hypotheses[self.winner]]
+            self.hypotheses[0].guarded = True
         return outputs, place
 
     def _prove(self, rest: NDArray[np.bool_]) -> None:

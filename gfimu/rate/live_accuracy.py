@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.array.array import AccelerometerArray
 from gfimu.rate.disagreement import POLICY, MeasuredNoise, ScaleSoFar
 from gfimu.rate.kalman import KalmanRateFilter
 from gfimu.rate.maximum_likelihood import rates_of_null_space

@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.array.array import AccelerometerArray
 from gfimu.rate.null_readings import null_readings
 from gfimu.rate.per_sample import KnownStart, per_sample_estimate
 from gfimu.rate.result import RateEstimate

@@ -19,11 +19,11 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gfimu.errors import InputError
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.array.array import AccelerometerArray
+from gfimu.array.integration import integrate_rate
+from gfimu.base.errors import InputError
 from gfimu.rate.algebraic import algebraic_rate
-from gfimu.rate.integration import integrate_rate
-from gfimu.rate.kalman import FilterSettings
+from gfimu.rate.kalman import FilterSettings, plausible_start
 from gfimu.rate.maximum_likelihood import maximum_likelihood_rate
 from gfimu.rate.null_readings import null_readings
 from gfimu.rate.per_sample import KnownStart
@@ -148,6 +148,8 @@ def _per_sample(
     errors: SensorErrors,
     settings: FilterSettings,
 ) -> RateEstimate:
+    times, rows = np.asarray(t, dtype=float), np.asarray(readings, dtype=float)
+    settings = plausible_start(array, times, rows, errors, settings)
     start: NDArray[np.float64] | None = settings.start_omega
     at_rest = start is not None and not np.any(start)
     known = None if start is None or at_rest else KnownStart(start, settings.start_std)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from numba import njit
 
-from gfimu.rate.recursion_data import FIFTH, FOURTH, INNER
+from gfimu.base.compiled import INNER
+from gfimu.rate.recursion_data import FIFTH, FOURTH
 
 __all__ = ["follow_differences", "inflation_of", "undersampled"]
 

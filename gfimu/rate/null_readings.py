@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gfimu.errors import GeometryError, InputError
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import GeometryError, InputError
 from gfimu.rate.rest_test import RestTest, constant_readings
 from gfimu.rate.sensing import ChannelTables, SensorErrors
 

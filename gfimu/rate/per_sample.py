@@ -6,13 +6,12 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.compiled import compiled
 from gfimu.rate.disagreement import measured_scale
 from gfimu.rate.null_readings import NullReadings
-from gfimu.rate.recursion_data import COMPILE
 from gfimu.rate.residual import bounded_covariance, least_curvature, residual_of
 from gfimu.rate.result import DECIDED, RateEstimate, SignDecision, clear_of_zero
 from gfimu.rate.sensing import ChannelTables, SensorErrors
@@ -137,7 +136,7 @@ def signed(
     return omega * side[:, None], np.where(side > 0, plus, 1.0 - plus)
 
 
-@njit(**COMPILE)
+@compiled
 def _sides(t, alpha, omega, plus):  # type: ignore[no-untyped-def]
     """Sign (n,) of each rate: +1 or −1 times ``omega``.
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from gfimu.rate.recursion_data import COMPILE, RecursionInput, Tables
+from gfimu.base.compiled import compiled
+from gfimu.rate.recursion_data import RecursionInput, Tables
 
 __all__ = ["prepare"]
 
@@ -14,7 +14,7 @@ _UNIFORM = 1e-6
 _GAP = 1.5
 
 
-@njit(**COMPILE)
+@compiled
 def prepare(
     first: int,
     last: int,

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.geometry.linear_solution import LinearSolution
+from gfimu.array.array import AccelerometerArray
+from gfimu.array.linear_solution import LinearSolution
+from gfimu.base.short_repr import short_repr
 from gfimu.rate.disagreement import Disagreement
-from gfimu.short_repr import short_repr
+from gfimu.rate.result import ChannelReport
 
 __all__ = ["RateProblem", "RateSolution"]
 
@@ -31,6 +32,8 @@ class RateProblem:
         Specific force along the channels, m/s²; NaN where one is missing.
     noise_std : ndarray, shape (c,)
         Standard deviation of one sample of each channel, m/s².
+    bias_std : ndarray, shape (c,), or None
+        Uncertainty of the constant bias of each channel, m/s²; None where the data sheets say it.
     linear : LinearSolution
         The part of α and p that is linear in the readings, and what ω adds to it.
     omega0 : ndarray, shape (3,), or None
@@ -47,6 +50,7 @@ class RateProblem:
     t_s: NDArray[np.float64]
     readings: NDArray[np.float64]
     noise_std: NDArray[np.float64]
+    bias_std: NDArray[np.float64] | None
     linear: LinearSolution
     omega0: NDArray[np.float64] | None
     gyro: NDArray[np.float64] | None = None
@@ -76,10 +80,18 @@ class RateSolution:
 
     def sentences(self) -> list[str]:
         """Return what is to be said of the rate in words: disagreeing channels, samples of undecided sign."""
+        channels = self.remarks.get("channels", {})
+        contradicted = {name: channels.get(name, 0) for name in ("restarts", "samples_without_rate")}
+        said = ChannelReport(**contradicted).sentences()
+        if self.remarks.get("calibration_biases_contradicted"):
+            said.append(
+                "the first readings contradict the calibration's biases, so their uncertainty is the data sheet's; was "
+                "this unit calibrated? calibrate it again (gfimu calibrate)"
+            )
         found, judged = self.remarks.get("disagreement"), self.remarks.get("consistency")
         if judged is not None and judged["worst_channel"] is not None:  # one channel is the cause of both, and named
-            return []
-        said = [] if found is None else Disagreement.from_dict(found).sentences()
+            return said
+        said += [] if found is None else Disagreement.from_dict(found).sentences()
         count = self.remarks.get("sign_undecided_samples", 0)
         if count and self.sign_probability is not None:
             said.append(

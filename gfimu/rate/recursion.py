@@ -30,20 +30,29 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from gfimu.base.compiled import INNER, compiled
 from gfimu.rate.interval import interval_weights
 from gfimu.rate.model_errors import follow_differences, inflation_of, undersampled
-from gfimu.rate.recursion_data import BLOCK, COMPILE, INNER, LAST_GOOD, RETURN, SAMPLES, STARTED, TIME, WALK
+from gfimu.rate.recursion_data import BLOCK, HELD, LAST_GOOD, RESTING, RETURN, SAMPLES, STARTED, TIME, WALK
 from gfimu.rate.rest_recursion import keep_rest, rest_block
-from gfimu.rate.second_order import second_order
+from gfimu.rate.slow_rate import largest_squares, probable_rate, second_order
 
 __all__ = ["forward"]
 
 _WALK_MEMORY = 1.0  # s, over which the change of α is averaged
 _HIDDEN = 0.1  # (⅓)²: share of the change of α by which its integral may be off, squared
 _SLOW = 1e-3  # tr P above this share of |ω|² switches the second-order terms on
+_BROAD = 0.02  # tr P above this share of |ω|²: the null space is linearised at the most probable rate
+_LARGE = 1.0  # of the noise's variance: squared second-order terms from which on linearisation fails
+_LASTING = 0.5  # s, for which a deviation from rest lasts, so that its second-order terms are no white noise
+_CLEAR = 9.0  # variances by which a rate must be clear of zero for a sample whose second-order terms exceed its noise
+_CLEAR = (
+    9.0  # variances by which a rate must be clear of zero for a sample to be used whose second-order terms are large
+)
+_CURVED = 0.01  # numerical: second-order terms below this share of the noise change nothing
 
 
-@njit(**COMPILE)
+@compiled
 def forward(  # type: ignore[no-untyped-def]
     data, first, last, closing, tables, tuning, state, out, offset, record
 ):
@@ -68,7 +77,10 @@ def forward(  # type: ignore[no-untyped-def]
     moved = np.zeros(3)
     rows = np.zeros((3, n))
     product = np.zeros((3, n))
-    settles = state.settles[0]
+    bound = np.zeros(3)
+    lin = np.zeros(3)
+    wide = np.zeros((3, 3))
+    lasting = max(1.0, _LASTING / tuning.period)
     noise_row = n - 3
     overshoot = tuning.overshoot
     renewed = (1.0 + overshoot) * (1.0 + overshoot)
@@ -259,47 +271,80 @@ def forward(  # type: ignore[no-untyped-def]
         w0 = x[0]
         w1 = x[1]
         w2 = x[2]
-        # In the first block after a start at rest ω is known from the start alone and drifts with the unknown bias of
-        # α: far too uncertain for a linearised z. If the block turns out as rest, the mean of z is used at its end.
-        settling = tuning.rest_window > state.counts[SAMPLES] and settles
-        if sensed and d > 0 and not settling:
+        if sensed and d > 0:
             plain = place == 0
             measured_rows = d if plain else tables.null_count[place]
             sensitivity = tables.null_sensitivity[place]
-            # The very first sample of a start in the dark is linearised where it is fitted.
-            slow = (state.counts[SAMPLES] > 0 or settles) and covariance[0, 0] + covariance[1, 1] + covariance[
-                2, 2
-            ] > _SLOW * (w0 * w0 + w1 * w1 + w2 * w2)
+            size = w0 * w0 + w1 * w1 + w2 * w2
+            spread = covariance[0, 0] + covariance[1, 1] + covariance[2, 2]
+            curved = spread > _SLOW * size and spread * spread * tables.null_size[place] > _CURVED * _CURVED
+            broad = spread > _BROAD * size and spread * spread * tables.null_size[place] > _LARGE
+            if broad:
+                # No rate is larger than the products of ω allow: that keeps its variance where linearisation holds.
+                largest_squares(data.z[k], tables, place, x, covariance, 1.0 + inflation, bound)
+                for a in range(3):
+                    if covariance[a, a] > bound[a]:
+                        for r in range(n):
+                            ph[r] = covariance[a, r]
+                        inverse = (ph[a] - bound[a]) / (ph[a] * ph[a])
+                        innovation = -x[a]
+                        if keep:
+                            h[:] = 0.0
+                            h[a] = 1.0
+                            _remember(record, row, used_rows, h, ph, inverse, innovation)
+                            used_rows += 1
+                        _apply(x, covariance, ph, inverse, innovation)
+                w0 = x[0]
+                w1 = x[1]
+                w2 = x[2]
+                probable_rate(data.z[k], tables, place, measured_rows, x, covariance, 1.0 + inflation, lin, wide)
+            else:
+                lin[0] = w0
+                lin[1] = w1
+                lin[2] = w2
+                if curved:
+                    for a in range(3):
+                        for b in range(3):
+                            wide[a, b] = covariance[a, b]
+            rests = state.counts[RESTING] > 0
+            widest = 0.0
             for i in range(measured_rows):
                 m = sensitivity[i]
-                h0 = 2.0 * w0 * m[0] + w1 * m[3] + w2 * m[4]
-                h1 = 2.0 * w1 * m[1] + w0 * m[3] + w2 * m[5]
-                h2 = 2.0 * w2 * m[2] + w0 * m[4] + w1 * m[5]
+                h0 = 2.0 * lin[0] * m[0] + lin[1] * m[3] + lin[2] * m[4]
+                h1 = 2.0 * lin[1] * m[1] + lin[0] * m[3] + lin[2] * m[5]
+                h2 = 2.0 * lin[2] * m[2] + lin[0] * m[4] + lin[1] * m[5]
                 slopes[i, 0] = h0
                 slopes[i, 1] = h1
                 slopes[i, 2] = h2
-                innovations[i] = data.z[k, i] - 0.5 * (h0 * w0 + h1 * w1 + h2 * w2)
+                predicted = h0 * (w0 - 0.5 * lin[0]) + h1 * (w1 - 0.5 * lin[1]) + h2 * (w2 - 0.5 * lin[2])
+                innovations[i] = data.z[k, i] - predicted
                 variances[i] = 1.0 + inflation
-                if slow:
+                if curved:
                     mean, wider = second_order(
-                        m,
-                        h0,
-                        h1,
-                        h2,
-                        covariance[0, 0],
-                        covariance[0, 1],
-                        covariance[0, 2],
-                        covariance[1, 1],
-                        covariance[1, 2],
-                        covariance[2, 2],
+                        m, wide[0, 0], wide[0, 1], wide[0, 2], wide[1, 1], wide[1, 2], wide[2, 2]
                     )
-                    innovations[i] -= mean
+                    if broad:
+                        if rests:
+                            wider *= lasting
+                        widest = max(widest, wider)
                     variances[i] += wider
+                    if not broad:
+                        innovations[i] -= mean
                 if plain:
                     innovations[i] -= x[6 + i]
                 else:
                     for j in range(d):
                         innovations[i] -= tables.null_bias[place, i, j] * x[6 + j]
+            clear = _CLEAR * (wide[0, 0] + wide[1, 1] + wide[2, 2])
+            bounded = tables.square_seen[place, 0] and tables.square_seen[place, 1] and tables.square_seen[place, 2]
+            small = rests or clear > lin[0] * lin[0] + lin[1] * lin[1] + lin[2] * lin[2]
+            if bounded and small and widest > 1.0 + inflation:
+                # Little is known of the rate but its bound: what z shows would be taken for biases. If the block turns
+                # out as rest, the mean of these z is used at its end.
+                for i in range(d):
+                    state.held[i] += data.z[k, i]
+                state.counts[HELD] += 1
+                measured_rows = 0
             _copy(x, before)
             for i in range(measured_rows):
                 h[:] = 0.0
@@ -362,14 +407,13 @@ def forward(  # type: ignore[no-untyped-def]
                     _remember(record, row, used_rows, h, ph, inverse, innovation)
                     used_rows += 1
                 _apply(x, covariance, ph, inverse, innovation)
-            if settling:
+            held = state.counts[HELD]
+            if held > 0:
                 for i in range(d):
                     for r in range(n):
                         ph[r] = covariance[6 + i, r]
-                    inverse = 1.0 / (1.0 / tuning.rest_window + ph[6 + i])
-                    innovation = -x[6 + i]
-                    for j in range(data.y.shape[1]):
-                        innovation += tables.null_rows[0, i, j] * state.reference[j]
+                    inverse = 1.0 / ((1.0 + inflation) / held + ph[6 + i])
+                    innovation = state.held[i] / held - x[6 + i]
                     if keep:
                         h[:] = 0.0
                         h[6 + i] = 1.0
@@ -380,6 +424,8 @@ def forward(  # type: ignore[no-untyped-def]
         if keep:
             record.updates[row] = used_rows
         if tuning.rest_window > 0 and state.counts[BLOCK] == 0:
+            state.held[:] = 0.0
+            state.counts[HELD] = 0
             _copy(x, state.block_x)
             for r in range(n):
                 _copy(covariance[r], state.block_covariance[r])

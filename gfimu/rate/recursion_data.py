@@ -1,24 +1,25 @@
-"""Arrays that the rate filter's recursion works on, and how it is compiled."""
+"""Arrays that the rate filter's recursion works on."""
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["COMPILE", "INNER", "Record", "RecursionInput", "RecursionOutput", "RecursionState", "Tables", "Tuning"]
-
-COMPILE: dict[str, Any] = {"cache": True, "error_model": "numpy", "fastmath": {"contract", "reassoc", "nsz"}}
-"""Options of numba for the recursions."""
-
-INNER: dict[str, Any] = {**COMPILE, "cache": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-"""The same for functions that only compiled ones call: no entry from Python is compiled, and none kept."""
+__all__ = [
+    "Record",
+    "RecursionInput",
+    "RecursionOutput",
+    "RecursionState",
+    "Tables",
+    "Tuning",
+]
 
 # Places in RecursionState.scalars
 TIME, WALK, LAST_GOOD, FOURTH, FIFTH = range(5)
 # Places in RecursionState.counts
-STARTED, BLOCK, REST_BLOCKS, SAMPLES, RUN, RESTING, PAST, RETURN, RETRY, DOUBT, PAIR = range(11)
+STARTED, BLOCK, REST_BLOCKS, SAMPLES, RUN, RESTING, PAST, RETURN, RETRY, DOUBT, PAIR, HELD = range(12)
 
 
 class Tables(NamedTuple):
@@ -33,6 +34,9 @@ class Tables(NamedTuple):
     plain: NDArray[np.bool_]  # (sets,)
     alpha_rows: NDArray[np.float64]  # (sets, 3, c)
     null_rows: NDArray[np.float64]  # (sets, d, c)
+    products: NDArray[np.float64]  # (sets, 6, d)
+    square_seen: NDArray[np.bool_]  # (sets, 3)
+    null_size: NDArray[np.float64]  # (sets,)
 
 
 class Tuning(NamedTuple):
@@ -63,8 +67,8 @@ class RecursionState(NamedTuple):
     covariance: NDArray[np.float64]  # (n, n)
     scalars: NDArray[np.float64]  # (5,)
     mean_alpha: NDArray[np.float64]  # (3,) over the filter's memory
-    counts: NDArray[np.int64]  # (11,)
-    settles: NDArray[np.bool_]  # (1,) the run starts at rest
+    counts: NDArray[np.int64]  # (12,)
+    held: NDArray[np.float64]  # (d,) sum of the z of this block that were not used
     block_x: NDArray[np.float64]  # (n,) state when the block began
     block_covariance: NDArray[np.float64]  # (n, n)
     reference: NDArray[np.float64]  # (c,) mean reading while the biases were learned, m/s²

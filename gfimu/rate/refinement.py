@@ -15,8 +15,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.errors import GeometryError
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import GeometryError
 from gfimu.rate.disagreement import POLICY, MeasuredNoise, lasting_scale, measured_scale
 from gfimu.rate.kalman import FilterSettings
 from gfimu.rate.maximum_likelihood import maximum_likelihood_rate
@@ -99,7 +99,8 @@ def noise_of_run(
     if errors.white_only:  # other stated errors are in the innovations' covariance, not in that of parity
         scale = parity_scale(array, readings, errors, period, causal=causal)
     if scale is None:
-        scale = lasting_scale(found.nis, found.nis_dof.astype(float), period, causal=causal)
+        right = np.isfinite(found.omega).all(axis=1)  # elsewhere the filter was wrong, and not the noise
+        scale = lasting_scale(np.where(right, found.nis, np.nan), found.nis_dof.astype(float), period, causal=causal)
     return scale
 
 
@@ -146,7 +147,7 @@ def _with_sign(
     settings: FilterSettings,
 ) -> RateEstimate:
     """Give each rate its more probable sign by the chain of the single samples, and the probability."""
-    start = settings.start_omega
+    start = None if found.channels.restarts else settings.start_omega
     at_rest = start is not None and not np.any(start)
     known = None if start is None or at_rest else KnownStart(start, settings.start_std)
     try:

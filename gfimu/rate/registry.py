@@ -12,15 +12,15 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Protocol, cast
 
-from gfimu.errors import InputError, unknown_name
-from gfimu.plugins import plugins
+from gfimu.base.errors import InputError, unknown_name
+from gfimu.base.plugins import plugins
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import ArrayLike
 
-    from gfimu.geometry.array import AccelerometerArray
+    from gfimu.array.array import AccelerometerArray
     from gfimu.rate.kalman import FilterSettings
     from gfimu.rate.result import RateEstimate
     from gfimu.rate.sensing import SensorErrors

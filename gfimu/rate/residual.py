@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from gfimu.bounds.sample import omega_products_jacobian
-from gfimu.rate.recursion_data import COMPILE
+from gfimu.base.compiled import compiled
+from gfimu.rate.bounds.sample import omega_products_jacobian
 
 __all__ = ["Residual", "bounded_covariance", "least_curvature", "residual_of"]
 
@@ -73,7 +72,7 @@ def bounded_covariance(
     return scale[:, None, None] ** 2 * np.linalg.inv(clear + scale[:, None, None] * curvature * eye)
 
 
-@njit(**COMPILE)
+@compiled
 def _residual_of(z, m, omega, curvature):  # type: ignore[no-untyped-def]
     n, rows = z.shape
     squares = np.full(n, np.nan)

@@ -5,20 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from gfimu.rate.recursion_data import (
-    BLOCK,
-    DOUBT,
-    INNER,
-    PAIR,
-    PAST,
-    REST_BLOCKS,
-    RESTING,
-    RETRY,
-    RETURN,
-    RUN,
-    SAMPLES,
-)
-from gfimu.rate.rest_test import HISTORY_BLOCKS
+from gfimu.base.compiled import INNER
+from gfimu.rate.recursion_data import BLOCK, DOUBT, PAIR, PAST, REST_BLOCKS, RESTING, RETRY, RETURN, RUN, SAMPLES
+from gfimu.rate.rest_test import HISTORY_BLOCKS, shown_variance
 
 __all__ = ["keep_rest", "rest_block"]
 
@@ -46,7 +35,11 @@ def rest_block(data, k, tables, tuning, state):  # type: ignore[no-untyped-def]
         return False
     counts[BLOCK] = 0
     doubts = counts[DOUBT]
-    span = 0 if data.vetoed[k] else _moving_blocks(data.y[k - window + 1 : k + 1], tables, tuning, state)
+    span = (
+        0
+        if data.vetoed[k]
+        else _moving_blocks(data.y[k - window + 1 : k + 1], data.z[k - window + 1 : k + 1], tables, tuning, state)
+    )
     if data.vetoed[k] or span > 0:
         if not data.vetoed[k]:
             # Besides the blocks that move, the one before them; none of those in doubt was taken for rest.
@@ -94,8 +87,8 @@ def keep_rest(state):  # type: ignore[no-untyped-def]
 
 
 @njit(**INNER)
-def _moving_blocks(y, tables, tuning, state):  # type: ignore[no-untyped-def]
-    """Test the block of readings y (window, c) for rest: 0, or how many blocks up to this one move.
+def _moving_blocks(y, z, tables, tuning, state):  # type: ignore[no-untyped-def]
+    """Test the block of readings y (window, c) and its null space z (window, d) for rest: 0, or how many blocks move.
 
     Amid a rest ``state.counts[DOUBT]`` is how many blocks up to this one are in doubt.
     """
@@ -114,6 +107,7 @@ def _moving_blocks(y, tables, tuning, state):  # type: ignore[no-untyped-def]
             return 1
         if state.block_x[a] ** 2 > ends[4] * (known[a, a] + tuning.rest_variance):  # never less than the full χ²
             return 1
+    noise = shown_variance(z)
     # Scatter within the block, and its second half against its first.
     mean = np.empty(c)
     scatter = 0.0
@@ -137,7 +131,8 @@ def _moving_blocks(y, tables, tuning, state):  # type: ignore[no-untyped-def]
         scatter += weight * (squares - total * total / window)
         difference = late / second - early / first
         halves += weight * difference * difference
-    halves /= 1.0 / first + 1.0 / second
+    scatter /= noise
+    halves /= noise * (1.0 / first + 1.0 / second)
     if scatter > ends[0] or halves > ends[1]:
         return 1
     size = max(d, 3)
@@ -159,7 +154,7 @@ def _moving_blocks(y, tables, tuning, state):  # type: ignore[no-untyped-def]
         alpha[a] = total
         value[a] = total
         for b in range(3):
-            spread[a, b] = known[3 + a, 3 + b] + tables.alpha_noise[0, a, b] / window
+            spread[a, b] = known[3 + a, 3 + b] + noise * tables.alpha_noise[0, a, b] / window
     alpha_statistic = _normalised_square(spread, value, 3)
     null_statistic = 0.0
     if d > 0:
@@ -170,20 +165,20 @@ def _moving_blocks(y, tables, tuning, state):  # type: ignore[no-untyped-def]
             value[j] = total
             for r in range(d):
                 spread[j, r] = known[6 + j, 6 + r]
-            spread[j, j] += 1.0 / window
+            spread[j, j] += noise / window
         null_statistic = _normalised_square(spread, value, d)
     if alpha_statistic > ends[2] or null_statistic > ends[3]:
         return 1
     doubtful = scatter > limits[0] or halves > limits[1] or alpha_statistic > limits[2] or null_statistic > limits[3]
     if doubtful and counts[DOUBT] > 0:  # the second in a row
         return 2
-    span = _moving_run(alpha, tables, tuning, state)
+    span = _moving_run(alpha, noise, tables, tuning, state)
     if span > 0 or counts[RESTING] == 0:
         return span
     # Two blocks together raise a doubt as well; it is over when the mean since it began is again what rest explains.
     since = counts[DOUBT] + 1
     counts[PAIR] = 0
-    if counts[RUN] > 1 and _run_statistic(max(since, 2), tables, tuning, state) > limits[2]:
+    if counts[RUN] > 1 and _run_statistic(max(since, 2), noise, tables, tuning, state) > limits[2]:
         doubtful = True
         counts[PAIR] = 1
     if doubtful:
@@ -198,7 +193,7 @@ def _moving_blocks(y, tables, tuning, state):  # type: ignore[no-untyped-def]
 
 
 @njit(**INNER)
-def _moving_run(alpha, tables, tuning, state):  # type: ignore[no-untyped-def]
+def _moving_run(alpha, noise, tables, tuning, state):  # type: ignore[no-untyped-def]
     """Test the blocks in a row that ended with this one, which alone moves not; rest begins when they are enough.
 
     Returns 0, or how many blocks up to this one move.
@@ -216,14 +211,15 @@ def _moving_run(alpha, tables, tuning, state):  # type: ignore[no-untyped-def]
     limit = tuning.rest_limits[2 if counts[RESTING] > 0 else 0, 2]
     span = 2
     while span <= min(run, length):
-        if _run_statistic(span, tables, tuning, state) > limit:
+        if _run_statistic(span, noise, tables, tuning, state) > limit:
             return span
         span *= 2
     if counts[RESTING] == 0:
         resumes = counts[RETRY] > 0
         if (
             run < (tuning.rest_retry if resumes else tuning.rest_entry)
-            or _run_statistic(min(run, length), tables, tuning, state) > tuning.rest_limits[0, 7 if resumes else 6]
+            or _run_statistic(min(run, length), noise, tables, tuning, state)
+            > tuning.rest_limits[0, 7 if resumes else 6]
         ):
             return 0
         spread = np.empty((3, 3))
@@ -240,8 +236,8 @@ def _moving_run(alpha, tables, tuning, state):  # type: ignore[no-untyped-def]
 
 
 @njit(**INNER)
-def _run_statistic(span, tables, tuning, state):  # type: ignore[no-untyped-def]
-    """Mean α of the last ``span`` blocks against its bias as known when they began."""
+def _run_statistic(span, noise, tables, tuning, state):  # type: ignore[no-untyped-def]
+    """Mean α of the last ``span`` blocks against its bias as known when they began, by the last block's noise."""
     length = len(state.run_alpha)
     run = state.counts[RUN]
     begin = (run - span) % length
@@ -253,8 +249,8 @@ def _run_statistic(span, tables, tuning, state):  # type: ignore[no-untyped-def]
             total += state.run_alpha[number % length, a]
         difference[a] = total / span - state.run_bias[begin, a]
         for b in range(3):
-            noise = tables.alpha_noise[0, a, b] / (span * tuning.rest_window)
-            spread[a, b] = state.run_covariance[begin, a, b] + noise
+            white = noise * tables.alpha_noise[0, a, b] / (span * tuning.rest_window)
+            spread[a, b] = state.run_covariance[begin, a, b] + white
     return _normalised_square(spread, difference, 3)
 
 

@@ -12,6 +12,9 @@ null space    mean z against its bias as known when the block began             
 rate          ω when the block began against zero                                    χ²(3)
 ============  ====================================================================  ==============
 
+Noise is what the block's own null space shows about the means of its halves, as no steady motion adds to that, or what
+is stated, whichever is larger (`shown_variance`).
+
 Each is tested at a fifth of the stated false-alarm rate, so that a block at rest fails in at most that share of cases.
 The mean α of the last 2, 4, 8 … blocks in a row is tested as well, against its bias as known when they began: it shows
 a departure too slow for one block.
@@ -39,11 +42,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import chdtri
 
-from gfimu.errors import InputError
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import InputError
+from gfimu.rate.sensing import ChannelTables, SensorErrors
 
 __all__ = ["HISTORY_BLOCKS", "KEPT_BLOCKS", "RUN_BLOCKS", "RestTest", "constant_readings"]
 
@@ -74,8 +79,6 @@ class RestTest:
         How far from zero the rate may be at rest, rad/s (standard deviation).
     largest_rate_std : float
         A block counts only if ω was known at least this well when it began, rad/s.
-    noise_margin : float
-        The true noise may be larger than stated by this ratio.
     entry_s : float
         How long a body must be still after a motion before that counts as rest, s.
     retry_s : float
@@ -87,7 +90,6 @@ class RestTest:
     loss: float = 1e-6
     rate_std: float = 5e-3
     largest_rate_std: float = 0.2
-    noise_margin: float = 0.1
     entry_s: float = 5.0
     retry_s: float = 1.5
 
@@ -110,7 +112,6 @@ class RestTest:
         false_alarm = self.false_alarm if false_alarm is None else false_alarm
         freedom = np.array([n_channels * (self.window(period) - 1), n_channels, 3, max(n_null, 1), 3])
         largest = chdtri(freedom, false_alarm / len(freedom))
-        largest[:2] *= (1.0 + self.noise_margin) ** 2
         return np.array([*largest, self.largest_rate_std**2, *chdtri(3, [0.2, 0.05])])
 
     def all_limits(self, n_channels: int, n_null: int, period: float) -> NDArray[np.float64]:
@@ -123,6 +124,25 @@ class RestTest:
         block = self.window(period) * period
         entry, retry = (min(max(1, round(time / block)), RUN_BLOCKS) for time in (self.entry_s, self.retry_s))
         return entry, retry
+
+
+@njit(cache=True, error_model="numpy")
+def shown_variance(z):  # type: ignore[no-untyped-def]
+    """Variance of the noise over the stated one that the null space z (window, d) of a block shows, 1 or more."""
+    window, d = z.shape
+    first = window // 2
+    squares = 0.0
+    for j in range(d):
+        for begin, end in ((0, first), (first, window)):
+            origin = z[begin, j]
+            total = 0.0
+            square = 0.0
+            for k in range(begin, end):
+                change = z[k, j] - origin
+                total += change
+                square += change * change
+            squares += square - total * total / (end - begin)
+    return max(1.0, squares / max(1, d * (window - 2)))
 
 
 def constant_readings(
@@ -156,13 +176,15 @@ def constant_readings(
     """
     settings = test or RestTest()
     rows = np.asarray(readings, dtype=float) / np.broadcast_to(np.asarray(noise_std, dtype=float), (array.n_channels,))
+    null = ChannelTables(array, SensorErrors.uniform(array, noise_std)).null_rows[0] * noise_std
     window = settings.window(period)
     blocks = len(rows) // window
     limits = settings.limits(array.n_channels, 0, period)
     block = rows[: blocks * window].reshape(blocks, window, array.n_channels)
+    noise = np.array([shown_variance(z) for z in block @ null.T])
     scatter = ((block - block.mean(axis=1, keepdims=True)) ** 2).sum(axis=(1, 2))
     half = window // 2
     difference = block[:, half:].mean(axis=1) - block[:, :half].mean(axis=1)  # (blocks, c)
     halves = (difference**2).sum(axis=1) / (1.0 / half + 1.0 / (window - half))
-    passed = (scatter <= limits[0]) & (halves <= limits[1])  # False where NaN
+    passed = (scatter <= limits[0] * noise) & (halves <= limits[1] * noise)  # False where NaN
     return np.append(np.repeat(passed, window), np.zeros(len(rows) - blocks * window, dtype=bool))

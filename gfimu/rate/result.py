@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.results import Panel, PlottedResult, Series, axis_series
-from gfimu.short_repr import joined, timing
+from gfimu.base.results import Panel, PlottedResult, Series, axis_series
+from gfimu.base.short_repr import joined, timing
 
 __all__ = ["DECIDED", "ChannelReport", "RateEstimate", "SignDecision", "clear_of_zero", "full_covariance", "undecided"]
 
@@ -53,6 +53,10 @@ class ChannelReport:
         Samples with too few channels to see α: the rate was carried on with growing uncertainty.
     gaps : int
         Gaps in time that were bridged.
+    restarts : int
+        How often the readings contradicted the filter for half a second, so that it started again from single samples.
+    samples_without_rate : int
+        Samples of such half seconds, and those whose readings fit no rate at all: they have none.
     """
 
     missing: Mapping[str, int] = field(default_factory=dict)
@@ -60,6 +64,8 @@ class ChannelReport:
     stuck: Mapping[str, int] = field(default_factory=dict)
     samples_without_alpha: int = 0
     gaps: int = 0
+    restarts: int = 0
+    samples_without_rate: int = 0
 
     def to_dict(self) -> dict[str, Any]:
         """Return the report as JSON can hold it."""
@@ -69,6 +75,8 @@ class ChannelReport:
             "stuck": dict(self.stuck),
             "samples_without_alpha": self.samples_without_alpha,
             "gaps": self.gaps,
+            "restarts": self.restarts,
+            "samples_without_rate": self.samples_without_rate,
         }
 
     def sentences(self) -> list[str]:
@@ -82,6 +90,12 @@ class ChannelReport:
             found.append(f"{self.samples_without_alpha} samples with too few channels: rate carried on, less certain")
         if self.gaps:
             found.append(f"{self.gaps} gaps in time bridged, rate less certain after each")
+        if self.restarts or self.samples_without_rate:
+            found.append(
+                f"the readings contradicted the filter for half a second or longer: it started again {self.restarts} "
+                f"times, and {self.samples_without_rate} samples have no rate (NaN); likely causes: shocks, a channel "
+                "that jumps, a wrong rate at the start; next: --method ml, or `gfimu noise`"
+            )
         return found
 
 
@@ -203,7 +217,7 @@ class RateEstimate(PlottedResult):
     @property
     def mean_nis(self) -> float:
         """Sum of ``nis`` over the sum of its degrees of freedom, 1 for a filter whose model is right."""
-        used = (self.nis_dof > 0) & np.isfinite(self.nis)
+        used = (self.nis_dof > 0) & np.isfinite(self.nis) & np.isfinite(self.omega).all(axis=1)
         freedom = int(self.nis_dof[used].sum())
         return float(self.nis[used].sum() / freedom) if freedom else float("nan")
 

@@ -13,24 +13,26 @@ and every smaller set of channels sees linear combinations of those: A' = A + K 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gfimu.errors import InputError
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.geometry.kinematics import require_all_motions
-from gfimu.geometry.observability import null_rows
-from gfimu.parts.part import white_noise_std
-from gfimu.parts.part_file import PartFile
-from gfimu.short_repr import short_repr
+from gfimu.array.array import AccelerometerArray
+from gfimu.array.kinematics import require_all_motions
+from gfimu.array.observability import null_rows
+from gfimu.array.parts.part import white_noise_std
+from gfimu.array.parts.part_file import PartFile
+from gfimu.base.errors import InputError
+from gfimu.base.short_repr import short_repr
 
-__all__ = ["ChannelTables", "SensorErrors", "step_of_readings"]
+__all__ = ["ChannelTables", "SensorErrors", "calibrated_bias_std", "step_of_readings"]
 
 _RANK_TOLERANCE = 1e-9
 _LARGEST = 1e6  # numerical: m/s², far beyond any part
+_SEEN = 1e-6  # numerical: of the best seen product
 _WEAK = 0.1  # products seen more weakly than this share of the best are not used to clean α
 _LEAST_NOISE_LSB = 0.3  # LSB: below that equal readings prove nothing
 _FOR_STEP = 20_000  # numerical: samples in which the step of the readings is looked for
@@ -90,8 +92,8 @@ class SensorErrors:
         if np.any(self.noise_std <= 0):
             raise InputError("noise_std must be positive for every channel; a real sensor has noise, m/s²")
         for name in ("scale_std", "placement_std", "timing_std", "gyro_noise_std", "gyro_bias_std"):
-            if not (np.isfinite(getattr(self, name)) and getattr(self, name) >= 0):
-                raise InputError(f"{name} = {getattr(self, name)!r}: must be a number ≥ 0")
+            if not 0 <= getattr(self, name) <= _LARGEST:
+                raise InputError(f"{name} = {getattr(self, name)!r}: must be a number ≥ 0, at most {_LARGEST:g}")
 
     @classmethod
     def uniform(
@@ -112,7 +114,7 @@ class SensorErrors:
     ) -> SensorErrors:
         """Take the errors from the data sheets of the array's parts (``models/parts``).
 
-        White noise is the part's (`gfimu.parts.part.white_noise_std`), with the quantisation step's Δ²/12 added;
+        White noise is the part's (`gfimu.array.parts.part.white_noise_std`), with the quantisation step's Δ²/12 added;
         bias is the typical deviation at switch-on. Other fields by name; ``noise_std`` is the white part. ``step``,
         m/s², is that of the readings, where it is coarser than the parts'.
 
@@ -215,6 +217,9 @@ class ChannelTables:
         self.null_bias = np.zeros((0, d, d))  # T
         self.null_count = np.zeros(0, dtype=np.int64)  # −1: α can't be seen with this set
         self.plain = np.zeros(0, dtype=np.bool_)  # α = A y − b_α with nothing else to subtract
+        self.products = np.zeros((0, 6, d))  # M⁺, of the products of ω
+        self.square_seen = np.zeros((0, 3), dtype=np.bool_)  # whether the null space shows the square of each axis
+        self.null_size = np.zeros(0)  # ‖M‖², s⁴/rad⁴ in units of the noise
         self.index(0)
 
     def index(self, missing: int) -> int:
@@ -227,6 +232,7 @@ class ChannelTables:
         rows = np.zeros((3, c))
         bias, leak, noise = np.zeros((3, d)), np.zeros((3, 6)), np.zeros((3, 3))
         rows_of_null, sensitivity, combination = np.zeros((d, c)), np.zeros((d, 6)), np.zeros((d, d))
+        products = np.zeros((6, d))
         count = -1
         if np.linalg.matrix_rank(self.array.regression_matrix[present] / self._length_scale, tol=1e-6) == 6:
             # Combinations of the null space that don't touch the missing channels.
@@ -240,6 +246,8 @@ class ChannelTables:
             bias = (rows - self._base_alpha) * self._variance @ self._basis.T  # (3, d), Z R Zᵀ = I
             leak = _clean(rows @ self.array.centripetal_matrix)
             noise = rows * self._variance @ rows.T
+            products = np.asarray(np.linalg.pinv(sensitivity, rcond=_SEEN), dtype=np.float64)
+        seen = np.abs((products @ sensitivity)[:3] - np.eye(6)[:3]).max(axis=1) < _SEEN
         self.masks = np.append(self.masks, np.int64(missing))
         self.alpha_rows = np.concatenate([self.alpha_rows, rows[None]])
         self.alpha_bias = np.concatenate([self.alpha_bias, bias[None]])
@@ -250,6 +258,9 @@ class ChannelTables:
         self.null_bias = np.concatenate([self.null_bias, combination[None]])
         self.null_count = np.append(self.null_count, np.int64(count))
         self.plain = np.append(self.plain, not (leak.any() or missing))
+        self.products = np.concatenate([self.products, products[None]])
+        self.square_seen = np.concatenate([self.square_seen, seen[None]])
+        self.null_size = np.append(self.null_size, np.sum(sensitivity**2))
         return len(self.masks) - 1
 
     def bias_covariance(self, bias_std: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -282,6 +293,18 @@ def _clean(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
     """Set rounding errors to zero, so that what cancels exactly is an exact zero."""
     largest = np.abs(matrix).max(initial=0.0)
     return np.where(np.abs(matrix) > _RANK_TOLERANCE * max(1.0, largest), matrix, 0.0)
+
+
+def calibrated_bias_std(metadata: Mapping[str, Any], array: AccelerometerArray) -> NDArray[np.float64] | None:
+    """Return how exactly a calibration knows the biases of a recording's channels, shape (c,), m/s².
+
+    None where the metadata state no calibration of every channel (``bias_std_m_s2``).
+    """
+    stated = metadata.get("bias_std_m_s2")
+    values = [stated.get(name) for name in array.channels] if isinstance(stated, Mapping) else [None]
+    if not all(isinstance(value, int | float) and 0.0 <= value <= _LARGEST for value in values):
+        return None
+    return np.array(values, dtype=float)
 
 
 def step_of_readings(readings: NDArray[np.float64]) -> float:

@@ -20,9 +20,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from gfimu.bounds.sample import omega_products_jacobian
-from gfimu.errors import GeometryError
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import GeometryError
+from gfimu.rate.bounds.sample import omega_products_jacobian
 from gfimu.rate.maximum_likelihood import rate_of_null_space
 from gfimu.rate.recursion_data import RecursionOutput
 from gfimu.rate.sensing import ChannelTables, SensorErrors

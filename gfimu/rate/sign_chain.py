@@ -28,10 +28,9 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from gfimu.rate.recursion_data import COMPILE
+from gfimu.base.compiled import compiled
 
 __all__ = ["SignChain", "SignPolicy", "SignSteps", "sign_probabilities"]
 
@@ -221,7 +220,7 @@ def _real_part(steps: SignSteps, before: int, behind: int, policy: SignPolicy) -
     return steps.alpha * (excess / np.maximum(excess + allowed, 1e-300))[:, None]
 
 
-@njit(**COMPILE)
+@compiled
 def _chain(  # type: ignore[no-untyped-def]
     t, alpha, omega, covariance, scale, rest, state, first_new, last, period, noise, bias, change, tail, rest_std, floor
 ):
@@ -354,7 +353,7 @@ def _chain(  # type: ignore[no-untyped-def]
     return plus
 
 
-@njit(**COMPILE)
+@compiled
 def _invert(m, out):  # type: ignore[no-untyped-def]
     """Invert a symmetric matrix (3, 3) into ``out``; returns the determinant."""
     c00 = m[1, 1] * m[2, 2] - m[1, 2] * m[1, 2]

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.array.array import AccelerometerArray
 from gfimu.rate.filter import increasing_times, require_finite, run_filter
-from gfimu.rate.kalman import FilterSettings, KalmanRateFilter, spread_rest
+from gfimu.rate.kalman import FilterSettings, KalmanRateFilter, plausible_start, spread_rest
 from gfimu.rate.refinement import refined
 from gfimu.rate.result import RateEstimate, SignDecision
 from gfimu.rate.sensing import SensorErrors
@@ -71,7 +71,8 @@ def smooth_rate(
     def run(with_settings: FilterSettings) -> RateEstimate:
         return _smoothed(array, times, rows, errors, with_settings, turning, period, progress)
 
-    return refined(array, times, rows, errors, settings or FilterSettings(), run, causal=False)
+    chosen = plausible_start(array, times, rows, errors, settings or FilterSettings())
+    return refined(array, times, rows, errors, chosen, run, causal=False)
 
 
 def _smoothed(

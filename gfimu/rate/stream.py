@@ -7,27 +7,37 @@ import itertools
 import json
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Annotated, Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gfimu.errors import InputError
-from gfimu.files.column_file import head_line
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.parts.part import Part
-from gfimu.parts.plausible import largest_of_array
+from gfimu.array.array import AccelerometerArray
+from gfimu.array.parts.part import Part
+from gfimu.array.parts.plausible import largest_of_array
+from gfimu.base.declared import Declared, figure
+from gfimu.base.errors import InputError
+from gfimu.base.files.column_file import head_line
+from gfimu.base.units import GYRO_COLUMNS, READING_UNITS
 from gfimu.rate.kalman import FilterSettings
 from gfimu.rate.live import LiveRateFilter
 from gfimu.rate.result import ChannelReport, RateEstimate
 from gfimu.rate.sensing import SensorErrors
-from gfimu.units import GYRO_COLUMNS, READING_UNITS
 
-__all__ = ["StreamFilter", "StreamLayout", "StreamSample", "filter_stream", "read_head", "stream_samples"]
+__all__ = [
+    "LiveSample",
+    "SkippedLine",
+    "StreamFilter",
+    "StreamLayout",
+    "StreamSample",
+    "filter_stream",
+    "read_head",
+    "stream_samples",
+]
 
 
 class StreamFilter(Protocol):
-    """A rate filter on a stream that watches its channels (`gfimu.integrity.live.watched_filter`)."""
+    """A rate filter on a stream that watches its channels (`gfimu.rate.health.live.watched_filter`)."""
 
     @property
     def report(self) -> ChannelReport:
@@ -36,7 +46,7 @@ class StreamFilter(Protocol):
 
     @property
     def health(self) -> list[int] | None:
-        """Health of each channel now (`gfimu.integrity.fault.HealthCode`); None while nothing is watched."""
+        """Health of each channel now (`gfimu.rate.health.fault.HealthCode`); None while nothing is watched."""
         ...
 
     def push(self, t: ArrayLike, readings: ArrayLike, gyro: ArrayLike | None = None) -> RateEstimate:
@@ -69,6 +79,45 @@ class StreamSample:
     t_s: float
     readings: NDArray[np.float64]
     gyro: NDArray[np.float64] | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class LiveSample(Declared):
+    """The estimate at one sample."""
+
+    t_s: Annotated[float, figure("Its time.", "s")]
+    omega_rad_s: Annotated[list[float] | None, figure("Angular rate, body axes.", "rad/s")]
+    omega_std_rad_s: Annotated[
+        list[float] | None, figure("Its standard deviation; null where it is not known.", "rad/s")
+    ]
+    rate_rad_s: Annotated[float | None, figure("About a known axis: the rate.", "rad/s", absent=True)] = None
+    rate_std_rad_s: Annotated[
+        float | None, figure("About a known axis: its standard deviation.", "rad/s", absent=True)
+    ] = None
+    alpha_rad_s2: Annotated[
+        float | None, figure("About a known axis: the angular acceleration.", "rad/s²", absent=True)
+    ] = None
+    angle_rad: Annotated[float | None, figure("About a known axis: the angle.", "rad", absent=True)] = None
+    nis: Annotated[float, figure("Normalised innovation squared.")]
+    nis_dof: Annotated[int, figure("Its degrees of freedom.")]
+    sign: Annotated[str, figure("Whether the sign of the rate is known, decided or undecided.")]
+    noise_scale: Annotated[float | None, figure("How much larger the noise is than stated.", absent=True)] = None
+    omega_sign_probability: Annotated[
+        float | None, figure("Probability that the sign of the rate is right.", absent=True)
+    ] = None
+    rest: Annotated[bool | None, figure("True where a block of rest ended.", absent=True)] = None
+    health: Annotated[
+        list[int] | None,
+        figure("Of each channel: 0 used, 1 excluded, 2 missing, 3 saturated, 4 stuck.", absent=True),
+    ] = None
+    fault: Annotated[dict[str, Any] | None, figure("What was wrong with the line or its channels.", absent=True)] = None
+
+
+@dataclass(frozen=True)
+class SkippedLine(Declared):
+    """A line that could not be read, and was skipped."""
+
+    fault: Annotated[str, figure("What was wrong with it.")]
 
 
 @dataclass(frozen=True)
@@ -220,12 +269,12 @@ def filter_stream(
     reported: dict[str, Any] = live.report.to_dict()
     for sample in stream_samples(lines, array, gyro=fuse_gyro):
         if isinstance(sample, str):
-            yield json.dumps({"fault": sample})
+            yield json.dumps(SkippedLine(sample).to_dict())
             continue
         try:
             found = live.push(sample.t_s, sample.readings, sample.gyro)
         except InputError as error:
-            yield json.dumps({"fault": str(error)})
+            yield json.dumps(SkippedLine(str(error)).to_dict())
             continue
         faults = live.report.to_dict()
         news = {key: value for key, value in faults.items() if value != reported[key]}
@@ -292,22 +341,19 @@ def _numbers(cells: list[str], layout: StreamLayout) -> np.ndarray:
 
 
 def _lines(found: RateEstimate, faults: dict[str, Any], health: list[int] | None) -> Iterator[str]:
-    std = found.std
+    std, last = found.std, len(found) - 1
     for k in range(len(found)):
-        record: dict[str, Any] = {
-            "t_s": float(found.t_s[k]),
-            "omega_rad_s": found.omega[k].tolist(),
-            "omega_std_rad_s": std[k].tolist() if np.isfinite(std[k]).all() else None,
-            "nis": float(found.nis[k]),
-            "nis_dof": int(found.nis_dof[k]),
-            "sign": found.sign.state,
-        }
-        further = {"noise_scale": found.scale, "omega_sign_probability": found.sign_probability}
-        record |= {name: float(values[k]) for name, values in further.items() if values is not None}
-        if found.rest[k]:
-            record["rest"] = True
-        if health is not None:
-            record["health"] = health
-        if faults and k == len(found) - 1:
-            record["fault"] = faults
-        yield json.dumps(record)
+        sample = LiveSample(
+            t_s=float(found.t_s[k]),
+            omega_rad_s=found.omega[k].tolist() if np.isfinite(found.omega[k]).all() else None,
+            omega_std_rad_s=std[k].tolist() if np.isfinite(std[k]).all() else None,
+            nis=float(found.nis[k]),
+            nis_dof=int(found.nis_dof[k]),
+            sign=found.sign.state,
+            noise_scale=None if found.scale is None else float(found.scale[k]),
+            omega_sign_probability=None if found.sign_probability is None else float(found.sign_probability[k]),
+            rest=True if found.rest[k] else None,
+            health=health,
+            fault=faults if faults and k == last else None,
+        )
+        yield json.dumps(sample.to_dict())

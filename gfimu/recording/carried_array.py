@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from gfimu.errors import InputError, RecordingWarning
-from gfimu.files.model_files import list_models, parse_toml
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.units import READING_UNITS
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import InputError, RecordingWarning
+from gfimu.base.files.model_files import list_models, parse_toml
+from gfimu.base.units import READING_UNITS
 
 __all__ = [
     "array_difference",

@@ -17,10 +17,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.errors import InputError, RecordingWarning
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.geometry.observability import unseen_motions
-from gfimu.parts.limits import PartLimits
+from gfimu.array.array import AccelerometerArray
+from gfimu.array.observability import unseen_motions
+from gfimu.array.parts.limits import PartLimits
+from gfimu.base.errors import InputError, RecordingWarning
 from gfimu.recording.carried_array import warn_of_other_array
 from gfimu.recording.evidence.explanation import explanations
 from gfimu.recording.evidence.gathering import gather
@@ -116,7 +116,7 @@ def examine(
     Returns
     -------
     tuple of Finding
-        What was found, as `check_recording`; each is a `gfimu.errors.RecordingWarning` too.
+        What was found, as `check_recording`; each is a `gfimu.base.errors.RecordingWarning` too.
 
     Raises
     ------

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.importing.oddities import rails_of
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.units import GYRO_COLUMNS
 from gfimu.recording.checks import Finding, noisy_channels
+from gfimu.recording.importing.oddities import rails_of
 from gfimu.recording.recording import Recording
-from gfimu.units import GYRO_COLUMNS
 
 __all__ = ["without_clipped"]
 

@@ -12,15 +12,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.errors import CorruptValueWarning, InputError, UnitError
-from gfimu.files.column_file import ColumnFile, open_columns
-from gfimu.files.table import ArrowStream
-from gfimu.files.table_columns import TableColumns
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.parts.part import Part
-from gfimu.parts.plausible import MOST_CORRUPT, largest_of_array, largest_of_part, largest_reference
+from gfimu.array.array import AccelerometerArray
+from gfimu.array.parts.part import Part
+from gfimu.array.parts.plausible import MOST_CORRUPT, largest_of_array, largest_of_part, largest_reference
+from gfimu.base.errors import CorruptValueWarning, InputError, UnitError
+from gfimu.base.files.column_file import ColumnFile, open_columns
+from gfimu.base.files.table import ArrowStream
+from gfimu.base.files.table_columns import TableColumns
+from gfimu.base.units import READING_UNITS, REFERENCE_UNITS, STANDARD_GRAVITY, TIME_COLUMNS, reference_quantity
 from gfimu.recording.carried_array import carried_array
-from gfimu.units import READING_UNITS, REFERENCE_UNITS, STANDARD_GRAVITY, TIME_COLUMNS, reference_quantity
 
 __all__ = ["RecordingContent", "read_recording_file"]
 
@@ -66,7 +66,7 @@ def read_recording_file(
     Parameters
     ----------
     path : str, Path or table
-        The file, or a table (see `gfimu.files.table_columns.TableColumns`).
+        The file, or a table (see `gfimu.base.files.table_columns.TableColumns`).
     array : AccelerometerArray or None
         The array whose channels must be there; None takes every channel found.
     unit : {"m_s2", "lsb"}

@@ -18,15 +18,15 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from gfimu.errors import InputError, RecordingWarning
-from gfimu.files.column_file import ColumnFile, open_columns
-from gfimu.files.table import ArrowStream, schema_metadata
-from gfimu.files.table_columns import TableColumns
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.importing.clock import increasing_times
-from gfimu.importing.column_map import ColumnMap, TimeSpec
-from gfimu.importing.recognise import map_hint
-from gfimu.parts.plausible import rails_of_array
+from gfimu.array.array import AccelerometerArray
+from gfimu.array.parts.plausible import rails_of_array
+from gfimu.base.errors import InputError, RecordingWarning
+from gfimu.base.files.column_file import ColumnFile, open_columns
+from gfimu.base.files.table import ArrowStream, schema_metadata
+from gfimu.base.files.table_columns import TableColumns
+from gfimu.recording.importing.clock import increasing_times
+from gfimu.recording.importing.column_map import ColumnMap, TimeSpec
+from gfimu.recording.importing.recognise import map_hint
 from gfimu.recording.mimu4444 import is_mimu4444, read_mimu4444
 from gfimu.recording.recording import Recording
 

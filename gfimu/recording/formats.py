@@ -8,14 +8,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import cast
 
-from gfimu.errors import InputError
-from gfimu.files.column_file import ColumnFile, open_columns
-from gfimu.files.input_file import is_there
-from gfimu.files.table import ArrowStream
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.importing.recognise import map_hint
-from gfimu.plugins import plugins
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import InputError
+from gfimu.base.files.column_file import ColumnFile, open_columns
+from gfimu.base.files.input_file import is_there
+from gfimu.base.files.memory import MemorySize, with_memory
+from gfimu.base.files.table import ArrowStream
+from gfimu.base.plugins import plugins
 from gfimu.recording.carried_array import carried_array, check_all_channels
+from gfimu.recording.importing.recognise import map_hint
 from gfimu.recording.mapped import MappedFile
 from gfimu.recording.mimu4444 import is_mimu4444, read_mimu4444
 from gfimu.recording.recording import Recording
@@ -63,9 +64,21 @@ def format_of_recording(path: object) -> RecordingFormat | None:
 
 
 def open_recording(
-    path: str | Path | MappedFile | ArrowStream, *, array: AccelerometerArray | None = None
+    path: str | Path | MappedFile | ArrowStream,
+    *,
+    array: AccelerometerArray | None = None,
+    max_memory: MemorySize | None = None,
 ) -> Recording:
     """Read a recording from a CSV or Parquet file, a MIMU4444 stream, a foreign file with its map, or a table object.
+
+    Parameters
+    ----------
+    path : str, Path, MappedFile or table
+        The recording.
+    array : AccelerometerArray, optional
+        The array whose channels must be there; by default every channel found is read.
+    max_memory : int or str, optional
+        Memory that reading a file may take, bytes or ``"2GB"``; by default four times its size and 500 MB.
 
     Raises
     ------
@@ -78,7 +91,9 @@ def open_recording(
     >>> gfimu.open_recording("run.parquet")  # doctest: +SKIP
     """
     if isinstance(path, MappedFile):
-        return path.read(array)
+        return path.with_memory(max_memory).read(array)
+    if isinstance(path, str | Path):
+        path = with_memory(path, max_memory)
     whole = format_of_recording(path)
     if whole is not None:
         return whole.read(cast("str | Path", path))

@@ -7,16 +7,16 @@ import json
 import math
 import os
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 
-from gfimu.errors import InputError
-from gfimu.files.input_file import check_input
+from gfimu.base.errors import InputError
+from gfimu.base.files.input_file import LONGEST_LINE, check_input
 from gfimu.recording.recording import Recording
 
-__all__ = ["recording_lines"]
+__all__ = ["recording_lines", "whole_lines"]
 
 _LOOK_AGAIN_S = 0.1
 _PARQUET = b"PAR1"
@@ -47,6 +47,20 @@ def recording_lines(path: str | Path, *, follow: bool = False) -> Iterator[str]:
     return _finished(file) if magic == _PARQUET else _text(file, follow=follow)
 
 
+def whole_lines(read: Callable[[int], str], source: str | Path) -> Iterator[str]:
+    """Yield the lines of a stream up to its end; the last one may have none.
+
+    Raises
+    ------
+    InputError
+        If a line goes on without end.
+    """
+    while line := read(LONGEST_LINE):
+        if len(line) >= LONGEST_LINE:
+            raise InputError(f"{source}: a line is longer than {LONGEST_LINE} characters; send a line per sample")
+        yield line
+
+
 def _finished(file: Path) -> Iterator[str]:
     """Lines of a Parquet file."""
     recording = Recording.read(file)
@@ -65,7 +79,7 @@ def _text(file: Path, *, follow: bool) -> Iterator[str]:
     with file.open(encoding="utf-8", errors="replace", newline="") as stream:
         while True:
             replaced = follow and not _is_same(file, stream.fileno())  # asked before the last look for more
-            while text := stream.readline():
+            for text in whole_lines(stream.readline, file):
                 waiting += text
                 if waiting.endswith("\n"):
                     yield waiting

@@ -13,16 +13,18 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import ArrayLike, NDArray
 
-from gfimu.errors import InputError, RecordingWarning
-from gfimu.files.table import ArrowStream, schema_metadata
-from gfimu.files.table_columns import TableColumns
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.importing.column_map import UNMAPPED, ColumnMap, load_map
-from gfimu.importing.piece import Piece, combined_file, merged_piece, piece_of
-from gfimu.importing.readers import read_foreign
-from gfimu.importing.readers.tables import table_file
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import InputError, RecordingWarning
+from gfimu.base.files.input_file import as_path
+from gfimu.base.files.memory import MemorySize, with_memory
+from gfimu.base.files.table import ArrowStream, schema_metadata
+from gfimu.base.files.table_columns import TableColumns
 from gfimu.recording.carried_array import array_metadata
 from gfimu.recording.filtered import filtered_recording, rows_between, without_rows
+from gfimu.recording.importing.column_map import UNMAPPED, ColumnMap, load_map
+from gfimu.recording.importing.piece import Piece, combined_file, merged_piece, piece_of
+from gfimu.recording.importing.readers import read_foreign
+from gfimu.recording.importing.readers.tables import table_file
 from gfimu.recording.recording import Recording
 
 __all__ = ["MappedFile", "RecordingLike", "mapped_recording", "mapped_reference"]
@@ -58,6 +60,11 @@ class MappedFile(os.PathLike[str]):
     def __str__(self) -> str:
         return str(self.path)
 
+    def with_memory(self, max_memory: MemorySize | None) -> MappedFile:
+        """Return the files with how much memory reading each may take (`gfimu.base.files.memory`)."""
+        path, *others = (as_path(with_memory(one, max_memory)) for one in (self.path, *self.others))
+        return replace(self, path=path, others=tuple(others))
+
     def read(self, array: AccelerometerArray | None = None, *, unit: str | None = "m_s2") -> Recording:
         """Return the recording; see `mapped_recording`, and `gfimu.recording.filtered` for a map without columns.
 
@@ -86,9 +93,9 @@ def mapped_recording(
     Parameters
     ----------
     source : str, Path, table, or sequence of paths
-        A file of any format of `gfimu.importing.readers`, a table of pandas, polars or pyarrow, or one file per chip
-        on a common clock: the later ones are interpolated to the times of the first. Or one file per sensor, where the
-        map names the later ones as tables.
+        A file of any format of `gfimu.recording.importing.readers`, a table of pandas, polars or pyarrow, or one file
+        per chip on a common clock: the later ones are interpolated to the times of the first. Or one file per sensor,
+        where the map names the later ones as tables.
     column_map : ColumnMap, str or Path
         The map, its name, or its TOML file.
     array : AccelerometerArray, optional

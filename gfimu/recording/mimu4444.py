@@ -17,10 +17,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.errors import InputError
-from gfimu.files.input_file import is_ordinary, read_bytes
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.parts.part import Part
+from gfimu.array.array import AccelerometerArray
+from gfimu.array.parts.part import Part
+from gfimu.base.errors import InputError
+from gfimu.base.files.input_file import as_path, is_ordinary, read_bytes
 from gfimu.recording.carried_array import array_metadata
 from gfimu.recording.recording import Recording
 
@@ -31,6 +31,7 @@ _GZIP_MAGIC = b"\x1f\x8b"
 _START, _PAYLOAD = 0xAA, 0x64
 _PACKET_BYTES = 106
 _CHIPS = 8
+_GROWS = 8.5  # numerical: memory for a byte of the stream, measured
 _TICK = 1.0 / 64e6
 _GYRO_LSB = math.radians(1.0 / 16.4)
 _GYRO_AXES = ("x", "y", "z")
@@ -92,7 +93,7 @@ def read_mimu4444(path: str | Path) -> Recording:
     >>> import gfimu
     >>> gfimu.read_mimu4444("stream.bin")  # doctest: +SKIP
     """
-    file = Path(path)
+    file = as_path(path)
     packets = _decode(_read_bytes(file))
     if packets is None:
         raise InputError(f"{file}: no valid MIMU4444 packet; give the raw serial stream (.bin or .bin.gz)")
@@ -129,7 +130,7 @@ def read_mimu4444(path: str | Path) -> Recording:
 
 
 def _read_bytes(file: Path) -> NDArray[np.uint8]:
-    return np.frombuffer(read_bytes(file), dtype=np.uint8)
+    return np.frombuffer(read_bytes(file, grows=_GROWS), dtype=np.uint8)
 
 
 def _decode(stream: NDArray[np.uint8]) -> _Packets | None:
@@ -140,10 +141,11 @@ def _decode(stream: NDArray[np.uint8]) -> _Packets | None:
         return None
     is_start = (stream[: last + 1] == _START) & (stream[3 : last + 4] == _PAYLOAD)
     starts = np.flatnonzero(is_start[body_start:]) + body_start
-    sums = np.concatenate([[0], np.cumsum(stream, dtype=np.int64)])
+    sums = np.zeros(len(stream) + 1, dtype=np.uint16)  # which wraps as the checksum does
+    np.cumsum(stream, dtype=np.uint16, out=sums[1:])
     end = starts + _PACKET_BYTES - 2
     checksum = stream[end].astype(np.int64) * 256 + stream[end + 1]
-    starts = _without_overlaps(starts[(sums[end] - sums[starts]) % 65536 == checksum])
+    starts = _without_overlaps(starts[sums[end] - sums[starts] == checksum])
     if not len(starts):
         return None
 

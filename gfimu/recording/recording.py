@@ -17,15 +17,16 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gfimu.errors import InputError, UnitError
-from gfimu.files.column_file import write_columns
-from gfimu.files.table import ArrowStream
-from gfimu.files.table_columns import TableColumns
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import InputError, UnitError
+from gfimu.base.files.column_file import write_columns
+from gfimu.base.files.memory import MemorySize, with_memory
+from gfimu.base.files.table import ArrowStream
+from gfimu.base.files.table_columns import TableColumns
+from gfimu.base.results import Panel, PlottedResult, Series, axis_series
+from gfimu.base.short_repr import joined, timing
 from gfimu.recording.carried_array import array_metadata, carried_array, with_carried_array
 from gfimu.recording.file import read_recording_file
-from gfimu.results import Panel, RunResult, Series, axis_series
-from gfimu.short_repr import joined, timing
 
 __all__ = ["Recording"]
 
@@ -39,7 +40,7 @@ def _few(names: list[str]) -> str:
 
 
 @dataclass(frozen=True)
-class Recording(RunResult):
+class Recording(PlottedResult):
     """Samples of an accelerometer array and its references.
 
     Parameters
@@ -257,11 +258,12 @@ class Recording(RunResult):
         array: AccelerometerArray | None = None,
         unit: str = "m_s2",
         needs_channels: bool = True,
+        max_memory: MemorySize | None = None,
     ) -> Recording:
         """Read a recording from a CSV or Parquet file, or from a table of pandas, polars or pyarrow.
 
         Values that can be no measurement (infinite, or far beyond any part's range) become NaN with a
-        `gfimu.errors.CorruptValueWarning`, and are counted in `corrupt`.
+        `gfimu.base.errors.CorruptValueWarning`, and are counted in `corrupt`.
 
         Parameters
         ----------
@@ -275,6 +277,8 @@ class Recording(RunResult):
             Unit of the readings in memory; ``lsb`` keeps raw counts and refuses files without them.
         needs_channels : bool
             Refuse a file of references alone, such as that of a gyro on a rate table.
+        max_memory : int or str, optional
+            Memory that reading a file may take, bytes or ``"2GB"``; by default four times its size and 500 MB.
 
         Raises
         ------
@@ -282,7 +286,8 @@ class Recording(RunResult):
             If the file is missing, empty, malformed, lacks a column, or its time does not increase; the message
             names the file, the line or column and the remedy.
         """
-        content = read_recording_file(path, array, unit, needs_channels=needs_channels)
+        source = with_memory(path, max_memory) if isinstance(path, str | Path) else path
+        content = read_recording_file(source, array, unit, needs_channels=needs_channels)
         return cls(**{item.name: getattr(content, item.name) for item in fields(content)}, unit=unit)
 
     def write(self, path: str | Path) -> None:

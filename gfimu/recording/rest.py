@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.errors import InputError
+from gfimu.base.errors import InputError
+from gfimu.base.short_repr import short_repr
 from gfimu.recording.recording import Recording
-from gfimu.short_repr import short_repr
 
 __all__ = ["Rest", "detect_rest", "mean_variance_factor", "motion_statistic", "rest_threshold"]
 

@@ -1,4 +1,8 @@
-"""Noise of accelerometers: Allan deviation, identification of its terms, synthesis, export."""
+"""Noise of accelerometers.
+
+In: a recording at rest, or the coefficients of a data sheet.
+Out: Allan deviation, N, B and K with their spread (`NoiseModel`), noise per channel, synthetic noise.
+"""
 
 from __future__ import annotations
 

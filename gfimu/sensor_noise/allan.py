@@ -6,13 +6,15 @@ Source: W. J. Riley, "Handbook of Frequency Stability Analysis", NIST SP 1065, 2
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gfimu.errors import InputError
-from gfimu.short_repr import short_repr
+from gfimu.base.declared import Declared, figure
+from gfimu.base.errors import InputError
+from gfimu.base.short_repr import short_repr
 
 __all__ = ["FLICKER_FLOOR", "AllanDeviation", "allan_deviation", "averaging_factors"]
 
@@ -27,23 +29,11 @@ _BLOCK = 8192
 
 
 @dataclass(frozen=True)
-class AllanDeviation:
-    """Allan deviation of one series, with the averaging times at which it was computed.
+class AllanDeviation(Declared):
+    """Allan deviation of one series of n samples, with the averaging times at which it was computed, shape (k,).
 
-    Parameters
-    ----------
-    factor : ndarray of int, shape (k,)
-        Samples per average, m.
-    tau : ndarray, shape (k,)
-        Averaging time, s.
-    deviation : ndarray, shape (k,)
-        Allan deviation, unit of the series.
-    n : int
-        Samples in the series.
-    rate : float
-        Sample rate, Hz.
-    overlapping : bool
-        Whether every starting sample was used.
+    ``factor`` are samples per average; ``rate`` is the sample rate, Hz; with ``overlapping`` every starting sample was
+    used.
 
     Examples
     --------
@@ -55,8 +45,8 @@ class AllanDeviation:
     """
 
     factor: NDArray[np.int64]
-    tau: Floats
-    deviation: Floats
+    tau: Annotated[Floats, figure("Averaging times.", "s", key="tau_s")]
+    deviation: Annotated[Floats, figure("Allan deviation at these, unit of the readings.")]
     n: int
     rate: float
     overlapping: bool = True
@@ -75,7 +65,22 @@ class AllanDeviation:
         return float(self.tau[place]), float(self.deviation[place])
 
     @property
-    def bias_instability(self) -> float:
+    def minimum_tau(
+        self,
+    ) -> Annotated[float, figure("Averaging time of that minimum.", "s", key="minimum_tau_s", before="tau")]:
+        """Averaging time of the minimum, s."""
+        return self.minimum[0]
+
+    @property
+    def bias_instability(
+        self,
+    ) -> Annotated[
+        float,
+        figure(
+            "Bias instability by the minimum of the Allan deviation, unit of the readings.",
+            key="bias_instability_from_minimum", before="minimum_tau",
+        ),
+    ]:  # fmt: skip
         """Bias instability read off the curve: its minimum over 0.664; an upper limit if the curve still falls."""
         return self.minimum[1] / FLICKER_FLOOR
 

@@ -14,15 +14,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import nnls
 from scipy.stats import chi2
 
-from gfimu.errors import InputError
+from gfimu.base.declared import Declared, figure
+from gfimu.base.errors import InputError
+from gfimu.base.short_repr import short_repr
 from gfimu.sensor_noise.allan import AllanDeviation, allan_deviation
-from gfimu.short_repr import short_repr
 
 __all__ = ["TERMS", "NoiseModel", "NoiseTerm", "identify_noise", "model_variance", "term_spectra"]
 
@@ -45,48 +47,26 @@ _LARGEST_SHARE = 12
 
 
 @dataclass(frozen=True)
-class NoiseTerm:
-    """One coefficient of the noise.
-
-    Parameters
-    ----------
-    symbol : str
-        A key of `TERMS`.
-    found : bool
-        Whether the data show it.
-    value : float
-        Coefficient; zero if not found.
-    low, high : float
-        95 % interval; if not found, zero and the 95 % upper limit.
-    std : float
-        Standard deviation of the coefficient; NaN if not found.
-    """
+class NoiseTerm(Declared):
+    """One coefficient of the noise; ``symbol`` is a key of `TERMS`."""
 
     symbol: str
-    found: bool
-    value: float
-    low: float
-    high: float
-    std: float
+    unit: Annotated[str, figure("Unit of the coefficient.")]
+    found: Annotated[bool, figure("Whether the data show it.")]
+    value: Annotated[float, figure("Coefficient; zero if not found.")]
+    low: Annotated[float, figure("Lower 95 % limit; zero if not found.", key="low_95")]
+    high: Annotated[float, figure("Upper 95 % limit.", key="high_95")]
+    std: Annotated[float, figure("Standard deviation; null if not found.")]
 
     @property
-    def name(self) -> str:
+    def name(self) -> Annotated[str, figure("Name of the term.", before="unit")]:
         """Name of the term."""
         return TERMS[self.symbol][0]
 
 
 @dataclass(frozen=True)
-class NoiseModel:
-    """Noise terms of one series, with their standard deviations.
-
-    Parameters
-    ----------
-    terms : dict of str to NoiseTerm
-        All terms by symbol, found or not.
-    allan : AllanDeviation
-        The curve they were fitted to.
-    misfit : float
-        Weighted square of the residuals over their number of degrees of freedom: near 1 where the model holds.
+class NoiseModel(Declared):
+    """Noise terms of one series, with their standard deviations, and the Allan deviation that they were fitted to.
 
     Examples
     --------
@@ -99,9 +79,20 @@ class NoiseModel:
     N = 0.099 ± 0.000 per √Hz
     """
 
-    terms: dict[str, NoiseTerm]
-    allan: AllanDeviation
-    misfit: float
+    terms: Annotated[
+        dict[str, NoiseTerm],
+        figure(
+            "Terms by symbol: Q quantisation, N velocity random walk, B bias instability, K acceleration random walk, "
+            "R ramp."
+        ),
+    ]
+    misfit: Annotated[
+        float,
+        figure(
+            "Weighted square of the residuals over their number of degrees of freedom: near 1 where the model holds."
+        ),
+    ]
+    allan: Annotated[AllanDeviation, figure("The curve.", flat=True)]
 
     __repr__ = short_repr
 
@@ -149,17 +140,21 @@ def term_spectra(f: ArrayLike, rate: float) -> Floats:
     )
 
 
-def identify_noise(values: ArrayLike, rate: float, *, candidates: Sequence[str] = tuple(TERMS)) -> NoiseModel:
+def identify_noise(
+    values: ArrayLike, rate: float, *, candidates: Sequence[str] = tuple(TERMS), unit: str = "m_s2"
+) -> NoiseModel:
     """Identify the noise terms of a series at rest.
 
     Parameters
     ----------
     values : array_like, shape (n,)
-        Evenly sampled series at rest, m/s².
+        Evenly sampled series at rest.
     rate : float
         Sample rate, Hz.
     candidates : sequence of str
         Symbols of the terms that may be in it; N always is.
+    unit : str
+        Unit of the series: ``m_s2``, ``rad_s`` or ``lsb``.
 
     Returns
     -------
@@ -179,14 +174,14 @@ def identify_noise(values: ArrayLike, rate: float, *, candidates: Sequence[str] 
     ('N',)
     """
     try:
-        return _identified(values, rate, candidates)
+        return _identified(values, rate, candidates, unit)
     except np.linalg.LinAlgError:
         raise InputError(
             "the readings vary too smoothly for noise: the unit moves, or they were filtered; give a recording at rest"
         ) from None
 
 
-def _identified(values: ArrayLike, rate: float, candidates: Sequence[str]) -> NoiseModel:
+def _identified(values: ArrayLike, rate: float, candidates: Sequence[str], unit: str) -> NoiseModel:
     series = np.asarray(values, dtype=float)
     if len(series) < _SHORTEST:
         raise InputError(f"{len(series)} samples are too few to identify noise; {_SHORTEST} or more are needed")
@@ -211,13 +206,15 @@ def _identified(values: ArrayLike, rate: float, candidates: Sequence[str]) -> No
     if freedom > 0 and misfit > chi2.ppf(0.999, freedom) / freedom:
         covariance = covariance * misfit
     terms = {}
-    for symbol in TERMS:
+    for symbol, (_, power) in TERMS.items():
         if symbol in chosen:
             place = chosen.index(symbol)
-            terms[symbol] = _found_term(symbol, squares[place], float(np.sqrt(covariance[place, place])))
+            std = float(np.sqrt(covariance[place, place]))
+            terms[symbol] = _found_term(symbol, unit + power, squares[place], std)
         else:
-            terms[symbol] = NoiseTerm(symbol, False, 0.0, 0.0, fit.upper_limit(chosen, symbol), float("nan"))
-    return NoiseModel(terms, allan, misfit)
+            limit = fit.upper_limit(chosen, symbol)
+            terms[symbol] = NoiseTerm(symbol, unit + power, False, 0.0, 0.0, limit, float("nan"))
+    return NoiseModel(terms, misfit, allan)
 
 
 class _Fit:
@@ -296,10 +293,10 @@ class _Fit:
         return float(np.sqrt(squares[-1] + 1.645 * np.sqrt(covariance[-1, -1])))
 
 
-def _found_term(symbol: str, square: float, std: float) -> NoiseTerm:
+def _found_term(symbol: str, unit: str, square: float, std: float) -> NoiseTerm:
     value = float(np.sqrt(square))
     low = float(np.sqrt(max(square - 1.96 * std, 0.0)))
-    return NoiseTerm(symbol, True, value, low, float(np.sqrt(square + 1.96 * std)), std / (2.0 * value))
+    return NoiseTerm(symbol, unit, True, value, low, float(np.sqrt(square + 1.96 * std)), std / (2.0 * value))
 
 
 def _flicker_variance(m: Floats) -> Floats:

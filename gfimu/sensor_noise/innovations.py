@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_discrete_are
 from scipy.optimize import nnls
 
-from gfimu.errors import InputError
+from gfimu.base.errors import InputError
 
 __all__ = ["FlickerShape", "add_noise", "flicker_shape"]
 
@@ -127,7 +127,7 @@ def add_noise(
     white, flicker : ndarray, shape (c,)
         Standard deviation of a sample's white noise, and rms of the 1/f noise over four records, in that unit.
     rng : numpy.random.Generator
-        Source of chance.
+        Random number generator.
     shape : FlickerShape, optional
         That of the record's length, where it is at hand.
 

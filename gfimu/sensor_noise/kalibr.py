@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gfimu.errors import UnitError
+from gfimu.base.errors import UnitError
 from gfimu.sensor_noise.recording_noise import RecordingNoise
 
 __all__ = ["kalibr_yaml"]

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from gfimu.files.atomic_file import atomic_path
+from gfimu.base.files.atomic_file import atomic_path
+from gfimu.base.results.colours import STYLES, chip_colour, css
 from gfimu.sensor_noise.recording_noise import RecordingNoise
-from gfimu.visual.colours import STYLES, chip_colour, css
 
 __all__ = ["noise_picture"]
 

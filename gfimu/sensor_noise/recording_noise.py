@@ -3,24 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.errors import InputError, unknown_name
+from gfimu.base.declared import Declared, Table, figure
+from gfimu.base.errors import InputError, unknown_name
+from gfimu.base.results import Panel, PlottedResult, Series, text_column
+from gfimu.base.short_repr import short_repr
+from gfimu.base.units import TIME_COLUMNS
 from gfimu.recording import Recording
 from gfimu.recording.rest import detect_rest
 from gfimu.recording.timing.reference_times import reference_series
-from gfimu.results import Panel, PlottedResult, Series, text_column
 from gfimu.sensor_noise.identification import TERMS, NoiseModel, identify_noise
-from gfimu.short_repr import short_repr
-from gfimu.units import TIME_COLUMNS
-
-if TYPE_CHECKING:
-    from gfimu.known_axis.accuracy.noise import AxisNoise
 
 __all__ = ["STRETCHES", "RecordingNoise", "recording_noise"]
 
@@ -32,21 +30,11 @@ _UNIT_WORDS = {"m_s2": "m/s²", "lsb": "counts"}
 
 
 @dataclass(frozen=True)
-class RecordingNoise(PlottedResult):
-    """Noise models of the channels of a recording.
+class RecordingNoise(Declared, PlottedResult):
+    """Noise of every channel of a recording at rest.
 
-    Parameters
-    ----------
-    models : mapping of str to NoiseModel
-        By channel; reference gyros as ``gyro_x`` … in rad/s.
-    unit : str
-        Unit of the readings: ``m_s2`` or ``lsb``; coefficients are in its terms.
-    rate : float
-        Sample rate of the channels, Hz; a gyro with times of its own has its own (``models["gyro_x"].allan.rate``).
-    start_s, duration_s : float
-        Stretch used, s.
-    about_axis : AxisNoise, optional
-        What it means for a rotation about a known axis (`gfimu.known_axis.accuracy.noise`), where that was asked for.
+    Reference gyros stand among the channels as ``gyro_x`` … in rad/s; one with times of its own has a rate of its own
+    (``models["gyro_x"].allan.rate``).
 
     Examples
     --------
@@ -56,12 +44,11 @@ class RecordingNoise(PlottedResult):
     2.85e-3 m/s²/√Hz
     """
 
-    models: Mapping[str, NoiseModel]
-    unit: str
-    rate: float
-    start_s: float
-    duration_s: float
-    about_axis: AxisNoise | None = None
+    unit: Annotated[str, figure("Unit of the readings; m_s2 is m/s².", head="unit of the readings")]
+    rate: Annotated[float, figure("Sample rate.", "Hz", head="sample rate", key="rate_hz")]
+    start_s: Annotated[float, figure("Start of the samples that were used.", "s", head="start")]
+    duration_s: Annotated[float, figure("Their length.", "s", head="duration")]
+    models: Annotated[Mapping[str, NoiseModel], figure("Noise by channel.", key="channels")]
 
     __repr__ = short_repr
 
@@ -81,10 +68,6 @@ class RecordingNoise(PlottedResult):
 
     def _heading(self) -> str:
         return "Noise at rest"
-
-    def _facts(self) -> list[tuple[str, str]]:
-        stretch = f"{self.duration_s:.4g} s from {self.start_s:.4g} s on, at {self.rate:.4g} Hz"
-        return [("channels", ", ".join(self.models)), ("stretch", stretch)]
 
     def _panels(self) -> list[Panel]:
         groups = (
@@ -122,55 +105,36 @@ class RecordingNoise(PlottedResult):
         return {name: model for name, model in self.models.items() if name.startswith("gyro")}
 
     @property
-    def shown(self) -> tuple[str, ...]:
+    def symbols(self) -> tuple[str, ...]:
         """Symbols of the terms worth a column: N, B, K, and others found on a channel."""
         return tuple(
             symbol for symbol in TERMS if symbol in "NBK" or any(model[symbol].found for model in self.models.values())
         )
 
-    def rows(self) -> list[tuple[str, ...]]:
-        """Rows of a table for people: channel, each of the terms `shown`, and B by the minimum of the curve.
+    def shown(self) -> Iterator[Table]:
+        """Yield the table that people read.
 
         A term found is written with its standard deviation in units of the last digit, 0.00453(7); another one as
         below its 95 % limit.
         """
+        unit = _UNIT_WORDS.get(self.unit, self.unit)
         rows = []
         for channel, model in self.models.items():
-            terms = [model[symbol] for symbol in self.shown]
+            terms = [model[symbol] for symbol in self.symbols]
             cells = [_concise(term.value, term.std) if term.found else f"<{term.high:.2g}" for term in terms]
             rows.append((channel, *cells, f"{model.allan.bias_instability:.3g}"))
-        return rows
+        meanings = [f"{symbol} {TERMS[symbol][0]}, {_times(unit, TERMS[symbol][1])}" for symbol in self.symbols]
+        yield Table(
+            f"noise over {self.duration_s:.1f} s from {self.start_s:.1f} s, {self.rate:.4g} Hz, readings in {unit}",
+            ("channel", *self.symbols, "B by minimum"),
+            rows,
+            note="; ".join(meanings) + "; <: not found, 95 % limit",
+        )
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return everything for machines; units stand in the keys' names of the contract's style."""
-        return ({} if self.about_axis is None else {"about_axis": self.about_axis.to_dict()}) | {
-            "unit": self.unit,
-            "rate_hz": self.rate,
-            "start_s": self.start_s,
-            "duration_s": self.duration_s,
-            "channels": {
-                channel: {
-                    "terms": {
-                        symbol: {
-                            "name": term.name,
-                            "unit": ("rad_s" if channel.startswith("gyro") else self.unit) + TERMS[symbol][1],
-                            "found": term.found,
-                            "value": term.value,
-                            "low_95": term.low,
-                            "high_95": term.high,
-                            "std": term.std,
-                        }
-                        for symbol, term in model.terms.items()
-                    },
-                    "misfit": model.misfit,
-                    "bias_instability_from_minimum": model.allan.bias_instability,
-                    "minimum_tau_s": model.allan.minimum[0],
-                    "tau_s": model.allan.tau,
-                    "deviation": model.allan.deviation,
-                }
-                for channel, model in self.models.items()
-            },
-        }
+
+def _times(unit: str, power: str) -> str:
+    """Return the unit of a term from that of the readings."""
+    return {"m/s²·s": "m/s", "m/s²/s": "m/s³"}.get(unit + power, unit + power)
 
 
 def _concise(value: float, std: float) -> str:
@@ -230,10 +194,11 @@ def recording_noise(
         if not np.isfinite(values).all():
             raise InputError(f"channel {name} has missing samples in the stretch used; choose another run")
         try:
-            models[name] = identify_noise(values, own_rate)
+            unit = "rad_s" if name.startswith("gyro") else recording.unit
+            models[name] = identify_noise(values, own_rate, unit=unit)
         except InputError as error:
             raise InputError(f"channel {name}: {error}") from None
-    return RecordingNoise(models, recording.unit, rate, float(part.t_s[0]), part.duration)
+    return RecordingNoise(recording.unit, rate, float(part.t_s[0]), part.duration, models)
 
 
 def _gyro_series(recording: Recording, column: str) -> tuple[NDArray[np.float64], float]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import fftconvolve
 
-from gfimu.errors import InputError
+from gfimu.base.errors import InputError
 
 __all__ = ["flicker_noise", "random_walk", "synthesise_noise", "white_noise"]
 

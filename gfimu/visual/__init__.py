@@ -1,57 +1,30 @@
-"""Pictures in rerun: a run with its estimate, and a measurement beside its predictions.
+"""Pictures: runs and comparisons in rerun, plots of HTML pages.
 
-Knows arrays of numbers only: whoever has a model of the rig hands its geometry over as boxes, cylinders and meshes.
+In: arrays of numbers; a rig as boxes, cylinders and meshes.
+Out: ``.rrd`` recordings and live streams, and the interactive plots and the style of HTML pages (`page`).
 """
 
 from typing import TYPE_CHECKING
 
-from gfimu.lazy_names import names_on_first_use
+from gfimu.base.lazy_names import declared_names
 
 if TYPE_CHECKING:
-    from gfimu.visual.comparison import write_comparison
-    from gfimu.visual.motion import ExpectedDrift, KnownMotion
-    from gfimu.visual.plots import Line, Plot
-    from gfimu.visual.run import write_run
-    from gfimu.visual.scene import Body, Box, Cylinder, Mesh, Names, Path, Pointers, Scene, SensingArrows
-
-__all__ = [
-    "Body",
-    "Box",
-    "Cylinder",
-    "ExpectedDrift",
-    "KnownMotion",
-    "Line",
-    "Mesh",
-    "Names",
-    "Path",
-    "Plot",
-    "Pointers",
-    "Scene",
-    "SensingArrows",
-    "write_comparison",
-    "write_run",
-]
-
-if not TYPE_CHECKING:  # colours and words are used where rerun is not installed
-    __getattr__ = names_on_first_use(
-        __name__,
-        {
-            "write_comparison": "comparison",
-            "ExpectedDrift": "motion",
-            "KnownMotion": "motion",
-            "Line": "plots",
-            "Plot": "plots",
-            "write_run": "run",
-            "Body": "scene",
-            "Box": "scene",
-            "Cylinder": "scene",
-            "Mesh": "scene",
-            "Names": "scene",
-            "Path": "scene",
-            "Pointers": "scene",
-            "Scene": "scene",
-            "SensingArrows": "scene",
-        },
-        needs=("a rerun recording", "rerun"),
-        without=("ExpectedDrift", "KnownMotion"),
+    from gfimu.visual.comparison import write_comparison as write_comparison
+    from gfimu.visual.motion import ExpectedDrift as ExpectedDrift
+    from gfimu.visual.motion import KnownMotion as KnownMotion
+    from gfimu.visual.plots import Line as Line
+    from gfimu.visual.plots import Plot as Plot
+    from gfimu.visual.run import write_run as write_run
+    from gfimu.visual.scene import Body as Body
+    from gfimu.visual.scene import Box as Box
+    from gfimu.visual.scene import Cylinder as Cylinder
+    from gfimu.visual.scene import Mesh as Mesh
+    from gfimu.visual.scene import Names as Names
+    from gfimu.visual.scene import Path as Path
+    from gfimu.visual.scene import Pointers as Pointers
+    from gfimu.visual.scene import Scene as Scene
+    from gfimu.visual.scene import SensingArrows as SensingArrows
+else:
+    __getattr__, __dir__, __all__ = declared_names(
+        __name__, needs=("a rerun recording", "rerun"), without=("ExpectedDrift", "KnownMotion")
     )

@@ -9,10 +9,10 @@ import numpy as np
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
-from gfimu.errors import InputError
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import InputError
+from gfimu.base.results.colours import AFTER, BEFORE, MEASURED, Colour
 from gfimu.recording import Recording
-from gfimu.visual.colours import AFTER, BEFORE, MEASURED, Colour
 from gfimu.visual.motion import KnownMotion
 from gfimu.visual.plots import Line, Plot
 from gfimu.visual.rig import drawing_size

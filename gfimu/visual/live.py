@@ -13,11 +13,13 @@ import rerun as rr
 import rerun.blueprint as rrb
 from rerun.blueprint.encodings import TextLogColumnKind
 
-from gfimu.errors import GeometryError
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.geometry.observability import require_all_motions
-from gfimu.visual.colours import AXES, ESTIMATE, HEALTH, TACHO, UNDECIDED, Colour, chip_colour
+from gfimu.array.array import AccelerometerArray
+from gfimu.array.observability import require_all_motions
+from gfimu.base.errors import GeometryError
+from gfimu.base.files.rerun_stream import markdown
+from gfimu.base.results.colours import AXES, ESTIMATE, HEALTH, TACHO, UNDECIDED, Colour, chip_colour
 from gfimu.visual.live_drawing import BODY, EVENTS, LiveDrawing, axis_columns
+from gfimu.visual.plots import entity_part
 from gfimu.visual.rig import array_shapes, axes_shapes, channel_shapes, chip_names, drawing_size, gravity_shapes
 from gfimu.visual.rig.words import array_words, scene_title
 from gfimu.visual.run import reading_arrows
@@ -81,7 +83,7 @@ class LivePicture:
             _style(stream, "rate/sign_probability", ["probability of the sign"], [UNDECIDED], 1.5)
             states = rr.StateConfiguration(values=list(HEALTH), labels=list(HEALTH), colors=list(HEALTH.values()))
             for channel in array.channels:
-                stream.log(f"health/{channel}", states, static=True)
+                stream.log(f"health/{entity_part(channel)}", states, static=True)
         for name, (_, lines) in _STREAM.items():
             _style(stream, f"stream/{name}", list(lines), list(lines.values()), 1.5)
         arrows = reading_arrows(array, np.zeros(1), np.zeros((1, array.n_channels)))
@@ -93,7 +95,7 @@ class LivePicture:
             show_labels=False,
         )
         stream.log(f"{BODY}/specific_force", sites, static=True)
-        stream.log(_NOTES, rr.TextDocument(self._notes(), media_type=rr.MediaType.MARKDOWN), static=True)
+        stream.log(_NOTES, markdown(self._notes()), static=True)
         stream.send_blueprint(self.blueprint(), make_active=True, make_default=True)
         return LiveDrawing(stream, array, arrows.length_per_m_s2)
 
@@ -139,7 +141,7 @@ class LivePicture:
         return [
             rrb.StateTimelineView(
                 origin="/health",
-                contents=[f"/health/{name}" for name in part],
+                contents=[f"/health/{entity_part(name)}" for name in part],
                 name=f"health, {part[0]} to {part[-1]}",
                 time_view=_window(),
             )

@@ -10,13 +10,13 @@ import rerun as rr
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.geometry.kinematics import motion_from_readings
-from gfimu.integrity.fault import HealthCode
-from gfimu.integrity.live.block import Health, LiveBlock, StreamState
+from gfimu.array.array import AccelerometerArray
+from gfimu.array.kinematics import motion_from_readings
+from gfimu.base.results.colours import HEALTH
 from gfimu.motion.attitude import from_rotation, integrate_attitude, to_rotation
-from gfimu.visual.colours import HEALTH
-from gfimu.visual.plots import broken_at_gaps
+from gfimu.rate.health.fault import HealthCode
+from gfimu.rate.health.live.block import Health, LiveBlock, StreamState
+from gfimu.visual.plots import broken_at_gaps, entity_part
 from gfimu.visual.rig import channel_shapes
 from gfimu.visual.scene import TIMELINE
 
@@ -115,7 +115,7 @@ class LiveDrawing:
         now = np.array([health.t_s])
         for channel, code, last in zip(self._array.channels, health.codes, before, strict=True):
             if code != last:
-                self._send(f"health/{channel}", now, rr.StateChange.columns(state=[_WORDS[code]]))
+                self._send(f"health/{entity_part(channel)}", now, rr.StateChange.columns(state=[_WORDS[code]]))
         if health.codes != self._codes:
             bad = [code in _BAD for code in health.codes]
             along = 1.3 * self._axes.vectors[bad]  # through the chip: one end may lie in the body

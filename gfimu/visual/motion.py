@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.geometry.turning_axis import TurningAxis
+from gfimu.array.array import AccelerometerArray
+from gfimu.array.turning_axis import TurningAxis
 from gfimu.motion.attitude import from_rotation, table_angle, to_rotation
 from gfimu.recording import Recording
 from gfimu.visual.rig.package import stand_height
@@ -68,7 +68,7 @@ class MotionEstimate(Protocol):
 
     @property
     def health(self) -> Mapping[str, NDArray[Any]] | None:
-        """Health of each channel by name, shape (n,): `gfimu.integrity.fault.HealthCode`; None where not watched."""
+        """Health of each channel by name, shape (n,): `gfimu.rate.health.fault.HealthCode`; None where not watched."""
         ...
 
 

@@ -5,14 +5,16 @@ from __future__ import annotations
 import os
 import tempfile
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from gfimu.errors import GeometryError, InputError
-from gfimu.files.table import ArrowStream
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.geometry.turning_axis import TurningAxis
-from gfimu.known_axis.estimation import estimate_about_axis
+from gfimu.array.array import AccelerometerArray
+from gfimu.array.turning_axis import TurningAxis
+from gfimu.base.declared import Declared
+from gfimu.base.errors import GeometryError, InputError
+from gfimu.base.files.input_file import as_path
+from gfimu.base.files.table import ArrowStream
+from gfimu.motion.axis_estimation import estimate_about_axis
 from gfimu.motion.estimate import Estimate
 from gfimu.motion.estimation import estimate
 from gfimu.motion.rest_bias import estimate_from_rest, rest_bias
@@ -23,7 +25,26 @@ from gfimu.recording.formats import is_estimate, open_run
 from gfimu.recording.mapped import MappedFile
 from gfimu.visual.run import write_estimate, write_run
 
-__all__ = ["picture_of", "picture_path"]
+__all__ = ["Viewed", "picture_of", "picture_path"]
+
+
+@dataclass(frozen=True)
+class Viewed(Declared):
+    """What is shown in the viewer.
+
+    Parameters
+    ----------
+    picture : Path
+        The rerun recording.
+    made : bool
+        Whether it was made, and not there before.
+    opens : bool
+        Whether the viewer is to open it.
+    """
+
+    picture: Path
+    made: bool = True
+    opens: bool = True
 
 
 def picture_path(recording: Path | None) -> Path:
@@ -67,7 +88,7 @@ def picture_of(
     InputError
         If the recording can't be read, names no array, is refused by its checks, or the picture can't be written.
     """
-    name = Path(recording) if isinstance(recording, str | Path | MappedFile) else Path()
+    name = as_path(recording) if isinstance(recording, str | Path | MappedFile) else Path()
     if name.suffix == ".rrd":
         raise InputError(f"{recording}: already a rerun recording; open it without --out")
     if isinstance(recording, Estimate) or (isinstance(recording, str | Path) and is_estimate(recording)):

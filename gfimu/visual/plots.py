@@ -11,10 +11,10 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
-from gfimu.visual.colours import Colour
+from gfimu.base.results.colours import Colour
 from gfimu.visual.scene import TIMELINE
 
-__all__ = ["LONGEST_LEGEND", "Line", "Plot", "broken_at_gaps"]
+__all__ = ["LONGEST_LEGEND", "Line", "Plot", "broken_at_gaps", "entity_part"]
 
 LONGEST_LEGEND = 12
 """Lines that a legend names; a longer one would cover the plot."""
@@ -72,12 +72,12 @@ class Plot:
     @property
     def entity(self) -> str:
         """Path of the plot in the recording."""
-        return f"plots/{_entity_part(self.title)}"
+        return f"plots/{entity_part(self.title)}"
 
     def log(self, stream: rr.RecordingStream) -> None:
         """Write the lines, by columns."""
         for number, line in enumerate(self.lines):
-            entity = f"{self.entity}/{number:02d}_{_entity_part(line.name)}"
+            entity = f"{self.entity}/{number:02d}_{entity_part(line.name)}"
             t, values = broken_at_gaps(line.t, line.values.reshape(len(line.t), -1))
             count = values.shape[1]
             style = rr.SeriesLines(names=[line.name] * count, colors=[line.colour] * count, widths=[line.width] * count)
@@ -155,7 +155,8 @@ def _some_points(line: Line) -> NDArray[np.float64]:
     return np.column_stack([np.repeat(line.t[::step], values.shape[1]), values.ravel()])
 
 
-def _entity_part(text: str) -> str:
+def entity_part(text: str) -> str:
+    """Return a name as a part of an entity path."""
     return re.sub(r"[^\w]+", "_", text).strip("_")
 
 

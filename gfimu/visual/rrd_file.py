@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-import rerun as rr
 import rerun.blueprint as rrb
 
-from gfimu.files.outputs import RERUN
-from gfimu.files.rerun_stream import rrd_stream
+from gfimu.base.files.outputs import RERUN
+from gfimu.base.files.rerun_stream import markdown, rrd_stream
 from gfimu.visual.plots import Plot
 from gfimu.visual.scene import TIMELINE, Scene
 from gfimu.visual.trace import PositionTrace
@@ -67,7 +66,7 @@ def write_rrd(
     with rrd_stream(path, "gfimu", blueprint=blueprint) as stream:
         stream.send_recording_name(title)
         if notes:
-            stream.log(NOTES, rr.TextDocument(notes, media_type=rr.MediaType.MARKDOWN), static=True)
+            stream.log(NOTES, markdown(notes), static=True)
         scene.log(stream)
         for plot in plots:
             plot.log(stream)

@@ -10,11 +10,11 @@ import rerun.blueprint as rrb
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.motion.attitude import from_rotation, to_rotation
 from gfimu.recording import Recording
 from gfimu.recording.timing.reference_times import reference_on_rows
-from gfimu.units import STANDARD_GRAVITY
 from gfimu.visual.motion import (
     ExpectedDrift,
     KnownMotion,

@@ -14,8 +14,8 @@ import rerun.blueprint as rrb
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.visual.colours import BACKGROUND, METAL, TABLE, Colour, chip_colour
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.results.colours import BACKGROUND, METAL, TABLE, Colour, chip_colour
 
 __all__ = [
     "Body",

@@ -9,7 +9,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
-from gfimu.visual.colours import ESTIMATE, TRUTH, Colour
+from gfimu.base.results.colours import ESTIMATE, TRUTH, Colour
 from gfimu.visual.scene import TIMELINE
 
 __all__ = ["PositionTrace"]

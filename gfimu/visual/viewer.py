@@ -5,8 +5,8 @@ from __future__ import annotations
 import subprocess
 from pathlib import Path
 
-from gfimu.errors import GfimuError, InputError
-from gfimu.files.rerun_stream import WEB_VIEWER, has_display, viewer_command
+from gfimu.base.errors import GfimuError, InputError
+from gfimu.base.files.rerun_stream import WEB_VIEWER, has_display, viewer_command
 
 __all__ = ["open_viewer"]
 

@@ -1,1 +1,5 @@
-"""Accelerometer chips: the sensing chain from specific force to counts, data sheets, conversion times."""
+"""Accelerometer chips.
+
+In: specific force at the sensing axes.
+Out: counts or m/s² as a chip of a data sheet reports them, and when it converts.
+"""

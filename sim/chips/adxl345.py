@@ -16,9 +16,9 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.errors import InputError
-from gfimu.geometry.array import AccelerometerArray, Chip
-from gfimu.short_repr import short_repr
+from gfimu.array.array import AccelerometerArray, Chip
+from gfimu.base.errors import InputError
+from gfimu.base.short_repr import short_repr
 from sim.chips.data_sheet import DataSheet
 
 __all__ = ["Sensor", "SensorErrors", "SensorSettings", "conversion_offsets", "draw_errors", "flicker", "quantise"]
@@ -157,7 +157,7 @@ def draw_errors(
     supply : float
         Supply voltage of the chips that have none of their own, V.
     rng : Generator
-        Source of chance.
+        Random number generator.
     """
     n = array.n_channels
     of_channel, axis = _figures(array, sheets)
@@ -230,7 +230,7 @@ class Sensor:
         settings : SensorSettings
             How the chips are set up; a chip's own supply and output data rate go first.
         rng : Generator
-            Source of chance for the errors.
+            Random number generator for the errors.
         part : str, optional
             Part of every chip, instead of those of the array.
 
@@ -276,7 +276,7 @@ class Sensor:
         temperature : ndarray, shape (n,)
             Board temperature, °C.
         rng : Generator
-            Source of chance for the noise.
+            Random number generator for the noise.
         noise_factor : float
             White noise against the data sheet's.
 

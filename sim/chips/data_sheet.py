@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.parts.part_file import PartFile, SupplyTable
-from gfimu.short_repr import short_repr
+from gfimu.array.parts.part_file import PartFile, SupplyTable
+from gfimu.base.short_repr import short_repr
 
 __all__ = ["DataSheet"]
 

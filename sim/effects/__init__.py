@@ -1,4 +1,8 @@
-"""Physical effects: one small class each, in a registry; each knows its name, parameters, priors and place."""
+"""Physical effects: one small class each, in a registry.
+
+In: the state of a world and the effect's sizes.
+Out: changed channels or reference, with name, parameters, priors, place and the run that separates it.
+"""
 
 from sim.effects.base import Effect, Pattern, Size
 from sim.effects.registry import (

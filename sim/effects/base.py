@@ -9,9 +9,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.errors import InputError
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.own_rig.places import Pattern, Size, channel_patterns, chip_patterns
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import InputError
+from gfimu.model.own_rig.places import Pattern, Size, channel_patterns, chip_patterns
 from sim.world import World
 
 __all__ = ["LARGEST_TURN", "Effect", "Pattern", "Size", "channel_patterns", "chip_patterns"]
@@ -44,7 +44,7 @@ class Effect(ABC):
     inexactness: ClassVar[float] = 0.0
     """Share of what it explains that its model may get wrong; beside it a further cause must explain more than that."""
     other_units: ClassVar[Mapping[str, str]] = {}
-    """Unit of each parameter that is no size, by key; `gfimu.units.RATIO`, ``NUMBER`` or ``NAME`` where it has none."""
+    """Unit of each parameter that is no size, by key; `gfimu.base.units.RATIO`, ``NUMBER`` or ``NAME``."""
     starts: ClassVar[tuple[float, ...]] = ()
     """Values in units of the prior to start from where a large size is far from linear; none by default."""
     whole: ClassVar[frozenset[str]] = frozenset()

@@ -9,9 +9,9 @@ import re
 import textwrap
 from unicodedata import normalize
 
-from gfimu.errors import InputError
-from gfimu.files.model_files import effect_catalogue
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import InputError
+from gfimu.base.files.model_files import effect_catalogue
 from sim.effects.base import Effect
 from sim.effects.description import describe
 from sim.effects.registry import (

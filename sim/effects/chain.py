@@ -8,8 +8,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.units import MILLI_G, RATIO
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.units import MILLI_G, RATIO
 from sim.effects.base import Effect, Size
 from sim.effects.low_pass import low_pass, mass_on_spring
 from sim.effects.per_channel import with_step

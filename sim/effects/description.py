@@ -24,7 +24,7 @@ import tomllib
 from dataclasses import dataclass
 from typing import Any
 
-from gfimu.errors import InputError
+from gfimu.base.errors import InputError
 
 __all__ = ["FIELDS", "OPTIONAL_FIELDS", "Description", "describe"]
 

@@ -7,9 +7,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.errors import InputError
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.units import NAME, NUMBER, RATIO
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import InputError
+from gfimu.base.units import NAME, NUMBER, RATIO
 from sim.effects.base import Effect, Size
 from sim.world import World
 

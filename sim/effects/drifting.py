@@ -6,8 +6,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.units import MILLI_G
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.units import MILLI_G
 from sim.effects.base import Effect, Size
 from sim.effects.per_channel import PerChannel, with_step
 from sim.world import World

@@ -14,7 +14,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.world_model import SpinState
+from gfimu.model.world_model import SpinState
 from sim.effects.base import Effect
 
 __all__ = [

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.array.array import AccelerometerArray
 from sim.effects.base import LARGEST_TURN, Effect, Pattern, Size
 from sim.world import Nod, World
 

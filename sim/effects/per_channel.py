@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.units import RATIO
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.units import RATIO
 from sim.effects.base import Effect, Pattern, Size, channel_patterns
 from sim.world import SensingStep, World
 

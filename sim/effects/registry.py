@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from gfimu.errors import InputError, unknown_name
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.plugins import plugins
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import InputError, unknown_name
+from gfimu.base.plugins import plugins
 from sim.effects import body, chain, digital, drifting, mechanical, mounting, rig, sensing, timing
 from sim.effects.base import Effect
 from sim.effects.unknown import Unknown

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import cont2discrete, lfilter
 
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.units import NUMBER, RATIO
-from gfimu.world_model import SpinState, Whitened
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.units import NUMBER, RATIO
+from gfimu.model.world_model import SpinState, Whitened
 from sim.effects.base import Effect, Pattern, Size, chip_patterns
 from sim.effects.low_pass import low_pass
 from sim.effects.scans import peaks

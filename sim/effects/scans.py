@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from gfimu.world_model import Whitened
+from gfimu.model.world_model import Whitened
 
 __all__ = ["mode_shapes", "order_shapes", "peaks", "tone_shapes"]
 

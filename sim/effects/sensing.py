@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.units import MILLI_G, RATIO, STANDARD_GRAVITY
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.units import MILLI_G, RATIO, STANDARD_GRAVITY
 from sim.effects.base import LARGEST_TURN, Effect, Pattern, Size, channel_patterns
 from sim.effects.per_channel import PerChannel, with_step
 from sim.world import World

@@ -7,9 +7,9 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.units import NUMBER, RATIO
-from gfimu.world_model import SpinState
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.units import NUMBER, RATIO
+from gfimu.model.world_model import SpinState
 from sim.effects.base import LARGEST_TURN, Effect, Size
 from sim.effects.scans import order_shapes, per_rate
 from sim.world import World

@@ -10,11 +10,11 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.errors import InputError
-from gfimu.generic_basis import OF_READING, UNIT_KEYS, Motion, basis_function, is_of_time, unit_parameters
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.units import NAME, STANDARD_GRAVITY
-from gfimu.world_model import BasisUnits, SpinState
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import InputError
+from gfimu.base.units import NAME, STANDARD_GRAVITY
+from gfimu.model.generic_basis import OF_READING, UNIT_KEYS, Motion, basis_function, is_of_time, unit_parameters
+from gfimu.model.world_model import BasisUnits, SpinState
 from sim.effects.base import Effect, Pattern, Size
 from sim.world import SampleContext, World
 

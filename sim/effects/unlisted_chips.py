@@ -7,8 +7,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.units import MILLI_G, STANDARD_GRAVITY
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.units import MILLI_G, STANDARD_GRAVITY
 from sim.effects.base import Pattern, Size, channel_patterns
 from sim.effects.grammar import KELVIN, LOAD, RATE_SQUARED, SPEED, USUAL_RATE, Dependence, Unlisted
 from sim.effects.low_pass import low_pass

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.array.array import AccelerometerArray
 from sim.effects.base import LARGEST_TURN, Size
 from sim.effects.grammar import (
     ACCELERATION,

@@ -1,1 +1,5 @@
-"""Motion as a function of time: table profiles, poses, carried and free bodies, and their file."""
+"""Motion as a function of time.
+
+In: motion files, profiles of a table, poses.
+Out: angle, rate and acceleration of table or body at any time.
+"""

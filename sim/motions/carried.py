@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
 
-from gfimu import world_model
-from gfimu.errors import InputError
+from gfimu.base.errors import InputError
+from gfimu.model import world_model
 from sim.motions.motion import BodyState, SpinMotion
 
 __all__ = ["Carriage", "Hand", "Wheel"]

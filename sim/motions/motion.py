@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import BSpline, CubicSpline, PPoly
 
-from gfimu.world_model import Spin
+from gfimu.model.world_model import Spin
 
 __all__ = ["BodyMotion", "BodyState", "SpinMotion", "SpinState", "SplineSpin"]
 

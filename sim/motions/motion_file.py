@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from gfimu.files.schema import NotNegative, Positive, Table, Triple, about
+from gfimu.base.files.schema import NotNegative, Positive, Table, Triple, about
 from sim.motions.carried import Carriage, Hand, Wheel
 from sim.motions.motion import BodyMotion, SpinMotion
 from sim.motions.pose_sequence import PoseSequence

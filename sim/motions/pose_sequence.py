@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from gfimu.errors import InputError, unknown_name
+from gfimu.base.errors import InputError, unknown_name
 from sim.motions.motion import BodyState
 
 __all__ = ["POSE_SETS", "PoseSequence"]

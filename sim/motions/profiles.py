@@ -18,8 +18,8 @@ from scipy.interpolate import PPoly, make_interp_spline
 from scipy.spatial.transform import Rotation
 from scipy.special import ellipj, ellipk
 
-from gfimu.errors import InputError
-from gfimu.geometry.smooth_ramp import smooth_ramp
+from gfimu.array.smooth_ramp import smooth_ramp
+from gfimu.base.errors import InputError
 from sim.motions.motion import BodyState, SplineSpin
 
 __all__ = ["Chirp", "Hold", "Ramp", "Segment", "Sine", "Tumble", "paper_run", "speed_sweep", "spin_profile"]

@@ -11,7 +11,7 @@ from typing import Literal
 
 import mujoco
 
-from gfimu.errors import InputError
+from gfimu.base.errors import InputError
 from sim.rigs.rig_model import SPIN_JOINT
 
 __all__ = ["MOTOR_FILE", "DcMotor"]

@@ -17,9 +17,9 @@ from mujoco.batch import Batch, SimulationError
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline, PPoly
 
-from gfimu import world_model
-from gfimu.errors import InputError
-from gfimu.short_repr import short_repr
+from gfimu.base.errors import InputError
+from gfimu.base.short_repr import short_repr
+from gfimu.model import world_model
 from sim.motions.motion import SpinMotion, SpinState, SplineSpin
 from sim.rigs.dc_motor import MOTOR_FILE, DcMotor
 from sim.rigs.mujoco_warnings import mujoco_warnings

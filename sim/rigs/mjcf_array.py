@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import fnmatch
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
 import mujoco
 import numpy as np
 
-from gfimu.errors import InputError, unknown_name
-from gfimu.files.input_file import check_input
-from gfimu.geometry.array import AccelerometerArray, Chip
+from gfimu.array.array import AccelerometerArray, Chip
+from gfimu.array.array_file import CHIP_NAME
+from gfimu.base.errors import InputError, unknown_name
+from gfimu.base.files.input_file import check_input
+from gfimu.base.files.memory import MemoryLimit
 from sim.rigs.mjcf_size import check_mjcf_size
 from sim.rigs.mujoco_warnings import mujoco_warnings
 
 __all__ = ["array_from_mjcf"]
 
+_TETRAHEDRON = (0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1)  # in place of a mesh, m
+_USER_NUMBERS = ("body", "jnt", "geom", "site", "cam", "tendon", "actuator", "sensor")
 _SAME_PLACE = 1e-6  # sites nearer than this belong to one chip, m
 
 
@@ -48,9 +53,9 @@ def array_from_mjcf(
     file = check_input(path)
     check_mjcf_size(file)
     try:
-        with mujoco_warnings(str(file)):
-            model = mujoco.MjModel.from_xml_path(str(file))
-    except ValueError as error:
+        with mujoco_warnings(str(file)), MemoryLimit.of(file).enforced():
+            model = _bare(mujoco.MjSpec.from_file(str(file))).compile()
+    except (ValueError, RuntimeError, MemoryError) as error:
         raise InputError(f"{file}: not a valid MJCF model ({' '.join(str(error).split())})") from None
     names = [model.site(i).name for i in range(model.nsite)]
     wanted = [i for i, name in enumerate(names) if name and fnmatch.fnmatchcase(name, sites)]
@@ -88,13 +93,32 @@ def array_from_mjcf(
     )
 
 
+def _bare(spec: mujoco.MjSpec) -> mujoco.MjSpec:
+    """Leave the sites alone: files of meshes and pictures are not read, memory that the model asks for is not taken."""
+    for mesh in spec.meshes:
+        mesh.file, mesh.uservert = "", _TETRAHEDRON
+    for texture in spec.textures:
+        texture.file, texture.builtin = "", mujoco.mjtBuiltin.mjBUILTIN_FLAT
+        texture.cubefiles = [""] * len(texture.cubefiles)
+        texture.width = texture.height = 1
+    for field in spec.hfields:
+        field.file, field.nrow, field.ncol, field.userdata = "", 2, 2, [0.0, 0.0, 0.0, 1.0]
+    for skin in list(spec.skins):
+        spec.delete(skin)
+    spec.nkey = spec.nuserdata = 0
+    spec.memory = spec.njmax = spec.nconmax = spec.nstack = -1
+    for kind in _USER_NUMBERS:
+        setattr(spec, f"nuser_{kind}", -1)
+    return spec
+
+
 def _chip(file: Path, number: int, names: Sequence[str], position: np.ndarray, axes: np.ndarray, part: str) -> Chip:
     """Build a chip from the sites at one point, named by what their names share."""
     if len(names) > 3:
         raise InputError(f"{file}: sites {', '.join(names)} share a point; a chip has at most three sensing axes")
     stem = names[0][:-1]
     regular = list(names) == [f"{stem}{axis}" for axis in range(1, len(names) + 1)]
-    return Chip(stem if regular and stem else f"a{number}", position, axes, part)
+    return Chip(stem if regular and stem and re.fullmatch(CHIP_NAME, stem) else f"a{number}", position, axes, part)
 
 
 def _frame_body(model: mujoco.MjModel, file: Path, body: str | None, sites: Sequence[int]) -> int:

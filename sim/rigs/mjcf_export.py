@@ -8,8 +8,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.errors import InputError, unknown_name
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import InputError, one_line, unknown_name
 from sim.rigs.mujoco_warnings import mujoco_warnings
 from sim.rigs.rig_model import channel_places, free_spec, turntable_spec
 from sim.world import World
@@ -43,7 +43,7 @@ def array_as_mjcf(array: AccelerometerArray, rig: str = "turntable") -> str:
     if rig not in RIGS:
         raise unknown_name("rig", rig, RIGS)
     spec = free_spec(World(array)) if rig == "free_cube" else turntable_spec(World(array), rig)
-    spec.modelname = array.name
+    spec.modelname = one_line(array.name)
     try:
         places = channel_places(spec.compile(), array)
     except ValueError as error:

@@ -1,59 +1,50 @@
-"""How large an MJCF file becomes, before MuJoCo compiles it: one that replicates without end is refused."""
+"""What an MJCF file becomes, before MuJoCo parses it: copies without end and files elsewhere are refused."""
 
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterator
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
-from gfimu.errors import InputError
+from gfimu.base.errors import InputError
+from gfimu.base.files.input_file import check_input, is_ordinary
 
 __all__ = ["check_mjcf_size"]
 
 _MOST_ELEMENTS = 50_000  # numerical: of the compiled model; an array has some tens of sites
-_MOST_CELLS = 50_000_000  # numerical: of a texture or height field
-_MOST_MEMORY = 1 << 30  # bytes that a model may ask for
-_UNITS = {"": 1, "K": 1 << 10, "M": 1 << 20, "G": 1 << 30, "T": 1 << 40, "P": 1 << 50, "E": 1 << 60}
+_PARSED = {"include", "model", "flexcomp"}  # elements whose file is read to parse this one
+_CELLS = 1000  # numerical: of a height field, that are as much as an element
 _ENDLESS = 10**12
 
 
 def check_mjcf_size(path: Path) -> None:
-    """Refuse an MJCF file that would become larger than an array can need.
+    """Refuse an MJCF file that would become larger than an array can need, or that takes in files of other folders.
 
-    Files that it includes count too. What can't be parsed is left to MuJoCo, which says why.
+    Files that it includes or attaches count too. What can't be parsed is left to MuJoCo, which says why.
 
     Raises
     ------
     InputError
-        If copies (``replicate``, ``composite``, ``flexcomp``), textures, height fields or the memory asked for are too
-        large.
+        If the copies (``replicate``, ``composite``, ``flexcomp``, ``attach``) are too many, or a file to parse is no
+        ordinary file in the folder of the model or below.
     """
     elements = 0
-    for name, element, copies in _elements(path, set()):
+    for copies in _copies(path, path.parent.resolve(), ()):
         elements += copies
         if elements > _MOST_ELEMENTS:
-            raise InputError(f"{path}: becomes more than {_MOST_ELEMENTS} elements; replicate fewer")
-        cells = max(
-            _number(element, "width") * _number(element, "height"), _number(element, "nrow") * _number(element, "ncol")
-        )
-        if cells > _MOST_CELLS:
-            raise InputError(f"{path}: a {name} of more than {_MOST_CELLS} cells; make it smaller")
-        asked = re.fullmatch(r"\s*(\d{1,18})([KMGTPE]?)\s*", element.get("memory", "0"))
-        if asked and int(asked[1]) * _UNITS[asked[2]] > _MOST_MEMORY:
-            raise InputError(f"{path}: asks for more than {_MOST_MEMORY >> 30} GB of memory; lower it")
+            raise InputError(f"{path}: becomes more than {_MOST_ELEMENTS} elements or numbers; replicate fewer")
 
 
-def _elements(path: Path, seen: set[Path]) -> Iterator[tuple[str, ET.Element, int]]:
-    """Yield the elements of a file and of those that it includes, each with how often it will be there."""
-    if path in seen or len(seen) > 100:
+def _copies(path: Path, folder: Path, around: tuple[Path, ...]) -> Iterator[int]:
+    """Yield of each element of a file, and of those that it takes in, how often it will be there."""
+    if path in around:
         return
-    seen.add(path)
     try:
         root = ET.parse(path).getroot()  # noqa: S314  expat stops entities that grow
     except (ET.ParseError, OSError, ValueError, RecursionError):
         return
+    models = {one.get("name", ""): _beside(path, one, folder) for one in root.iter("model") if one.get("file")}
     waiting = [(root, 1)]
     while waiting:
         element, copies = waiting.pop()
@@ -61,14 +52,22 @@ def _elements(path: Path, seen: set[Path]) -> Iterator[tuple[str, ET.Element, in
         if element.tag in {"replicate", "composite", "flexcomp"}:
             numbers = [_whole(word) for word in element.get("count", "1").split()[:3]]
             inner = min(copies * max(math.prod(numbers), 1), _ENDLESS)
-        yield str(element.tag), element, inner
-        if element.tag == "include":
-            yield from _elements(path.parent / element.get("file", ""), seen)
+        yield inner + _whole(element.get("nrow", "0")) * _whole(element.get("ncol", "0")) // _CELLS
+        taken = _beside(path, element, folder) if element.tag in _PARSED and element.get("file") else None
+        if element.tag == "attach":
+            taken = models.get(element.get("model", ""))
+        if taken is not None and element.tag in {"include", "attach"}:
+            yield from (copies * count for count in _copies(taken, folder, (*around, path)))
         waiting += [(one, inner) for one in element]
 
 
-def _number(element: ET.Element, key: str) -> int:
-    return _whole(element.get(key, "0"))
+def _beside(path: Path, element: ET.Element, folder: Path) -> Path:
+    """Return a file that an element takes in; it must lie in the folder of the model or below."""
+    name = element.get("file", "")
+    file = next((one for one in (path.parent / name, folder / name) if is_ordinary(one)), path.parent / name)
+    if not file.resolve().is_relative_to(folder):
+        raise InputError(f"{path}: {element.tag} {name[:80]!r} lies in another folder; copy it beside this file")
+    return check_input(file)
 
 
 def _whole(text: str) -> int:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from gfimu.files.schema import NotNegative, Positive, Table, about
+from gfimu.base.files.schema import NotNegative, Positive, Table, about
 from sim.rigs.dc_motor import DcMotor
 
 __all__ = ["MotorTable"]

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 
 import mujoco
 
-from gfimu.errors import RecordingWarning
+from gfimu.base.errors import RecordingWarning
 
 __all__ = ["mujoco_warnings"]
 

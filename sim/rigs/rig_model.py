@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from gfimu.errors import InputError
-from gfimu.files.model_files import find_model
-from gfimu.geometry.array import AccelerometerArray, Chip
+from gfimu.array.array import AccelerometerArray, Chip
+from gfimu.base.errors import InputError
+from gfimu.base.files.model_files import find_model
 from sim.rigs.mujoco_warnings import mujoco_warnings
 from sim.world import World
 

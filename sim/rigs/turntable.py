@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from gfimu import world_model
+from gfimu.model import world_model
 from sim.earth import earth_readings
 from sim.forward import arm_growth, lean_states
 from sim.motions.motion import BodyMotion, BodyState, SpinMotion

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from gfimu.cli import main
+from gfimu.commands.shell.program import main
 
 
 @dataclass(frozen=True)

@@ -19,19 +19,31 @@ ABSURD = [
     ("drift --gravity inf --bias-mg 1", "gravity"),
     ("score cube12 --speed-rad-s 1e308", "--speed-rad-s"),
     ("score one_chip --axis z --rate 1e12", "samples"),
-    ("score one_chip --axis z --bias-std-m-s2 1e308", "bias_std_m_s2"),
+    ("score one_chip --axis z --bias-std-m-s2 1e29", "bias_std_m_s2"),
     ("simulate rest --out x.csv --set duration_s=1e9", "samples"),
-    ("simulate hand --out x.csv --set duration_s=1e308", "samples"),
+    ("simulate hand --out x.csv --set duration_s=1e29", "samples"),
     ("simulate hand --out x.csv --set motion.pace_s=1e-9", "movements"),
-    ("simulate paper_run --out x.csv --set motion.segment=[{kind='ramp',to_rad_s=1.0,duration_s=1e-70}]", "a piece of"),
+    ("simulate paper_run --out x.csv --set motion.segment=[{kind='ramp',to_rad_s=1.0,duration_s=1e-29}]", "a piece of"),
     ("simulate rest --out x.csv --set gravity_m_s2=-1" + "0" * 400, "gravity_m_s2"),
     ("design bias gravity --twin cube12_turntable --duration 1e9", "duration"),
     ("live --array cube12 --rate 1e308 --from run.csv", "--rate"),
     ("live --array cube12 --rate 1e-308 --from run.csv", "--rate"),
-    ("live --array cube12 --rate 100 --bias-std-m-s2 1e308 --from run.csv", "bias_std"),
-    ("calibrate six-position run.csv --out c.json --min-rest 1e308", "shortest rest"),
-    ("join run.csv tacho.csv --array cube12 --out j.csv --most-rate-error 1e308", "rate error"),
-    ("estimate run.csv --array cube12 --out e.csv --axis z --point-std-m 1e308", "point_std_m"),
+    ("live --array cube12 --rate 100 --bias-std-m-s2 1e29 --from run.csv", "bias_std"),
+    ("calibrate six-position run.csv --out c.json --min-rest 1e29", "shortest rest"),
+    ("join run.csv tacho.csv --array cube12 --out j.csv --most-rate-error 1e29", "rate error"),
+    ("estimate run.csv --array cube12 --out e.csv --axis z --point-std-m 1e29", "point_std_m"),
+    (
+        "simulate hand --out x.csv --set duration_s=1e308",
+        "duration_s = 1e+308 must be a finite number, zero or between 1e-60 and 1e+30",
+    ),
+    (
+        "estimate run.csv --array cube12 --out e.csv --axis z --axis-point 0 1e308 0",
+        "--axis-point 0.0 1e+308 0.0: must be",
+    ),
+    ("drift --gravity 0 --bias-mg 1", "gravity"),
+    ("drift --gravity -9.8 --bias-mg 1", "gravity"),
+    ("show " + "n" * 300 + ".toml", "File name too long"),
+    ("convert run.csv x.csv --drop caf\udce9", "caf\\udce9"),
 ]
 
 WITHOUT_EFFECT = [
@@ -96,11 +108,37 @@ def test_a_large_mjcf_is_refused_before_it_is_compiled(gfimu_command, tmp_path):
             result = gfimu_command("score", tmp_path / name)
             assert result.code == 2
             assert "more than 50000 elements" in result.stderr
-    picture = "<asset><texture name='t' builtin='flat' width='100000' height='100000'/></asset>"
-    (tmp_path / "wide.xml").write_text(f"<mujoco>{picture}<worldbody>{inner}</worldbody></mujoco>")
-    assert "cells; make it smaller" in gfimu_command("score", tmp_path / "wide.xml").stderr
-    (tmp_path / "hungry.xml").write_text(f"<mujoco><size memory='100G'/><worldbody>{inner}</worldbody></mujoco>")
-    assert "of memory; lower it" in gfimu_command("score", tmp_path / "hungry.xml").stderr
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        "<asset><texture name='t' builtin='flat' width='100000' height='100000'/></asset>",
+        "<asset><texture name='t' type='2d' file='/dev/zero'/><mesh name='m' file='../elsewhere.stl'/></asset>",
+        "<size memory='100G' nkey='100000000' nuserdata='1000000000' nuser_site='500000000'/>",
+        "<size njmax='100000000' nconmax='100000000'/>",
+    ],
+    ids=["texture", "files", "size", "contacts"],
+)
+def test_meshes_and_pictures_of_an_mjcf_are_not_read(gfimu_command, tmp_path, content):
+    sites = "".join(f"<site name='a{k}' pos='{k} 0 0'/>" for k in range(3))
+    (tmp_path / "model.xml").write_text(
+        f"<mujoco>{content}<worldbody><body><geom size='1'/>{sites}</body></worldbody></mujoco>"
+    )
+    assert "array 'model' (rank 1 of 6, 3 channels) can't see" in gfimu_command("score", tmp_path / "model.xml").stderr
+
+
+@pytest.mark.parametrize("name", ["../other/part.xml", "/dev/zero", "pipe.xml"])
+@pytest.mark.parametrize("taken", ["<include file='{}'/>", "<asset><model name='m' file='{}'/></asset>"])
+def test_an_mjcf_takes_in_files_of_its_own_folder_only(gfimu_command, tmp_path, name, taken):
+    for folder in ("mine", "other"):
+        (tmp_path / folder).mkdir()
+    (tmp_path / "other/part.xml").write_text("<mujoco><worldbody><site name='a1'/></worldbody></mujoco>")
+    os.mkfifo(tmp_path / "mine/pipe.xml")
+    (tmp_path / "mine/model.xml").write_text(f"<mujoco>{taken.format(name)}</mujoco>")
+    result = gfimu_command("score", tmp_path / "mine/model.xml")
+    assert result.code == 2
+    assert "lies in another folder" in result.stderr or "is no ordinary file" in result.stderr
 
 
 def test_a_short_campaign_of_mutated_inputs(project_root, tmp_path):

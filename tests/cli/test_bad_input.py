@@ -1,5 +1,7 @@
 """Bad input ends with one line that says what is wrong, exit code 2, no traceback and no output file."""
 
+import contextlib
+import shutil
 import subprocess
 import sys
 
@@ -7,6 +9,9 @@ import numpy as np
 import pytest
 
 from gfimu import AccelerometerArray, Recording
+from tests.fuzz import commands as bad
+
+_BY_LOT = 6
 
 CUBE = AccelerometerArray.load("cube12")
 HEADER = "t_s," + ",".join(f"{channel}_m_s2" for channel in CUBE.channels)
@@ -192,7 +197,13 @@ def test_convert_refuses_the_same(gfimu_command, tmp_path, content, words):
 
 def test_the_installed_program_ends_with_code_two(tmp_path):
     Recording.from_arrays(np.arange(3.0), np.zeros((3, 12)), CUBE).write(tmp_path / "run.parquet")
-    command = [sys.executable, "-c", "from gfimu.cli import main; main()", "estimate", str(tmp_path / "run.parquet")]
+    command = [
+        sys.executable,
+        "-c",
+        "from gfimu.commands.shell.program import main; main()",
+        "estimate",
+        str(tmp_path / "run.parquet"),
+    ]
     finished = subprocess.run(
         [*command, "--array", "cube13", "--out", str(tmp_path / "e.csv")], capture_output=True, text=True, check=False
     )
@@ -219,3 +230,37 @@ def test_where_no_axis_can_be_given_none_is_proposed(gfimu_command, command):
     assert result.code == 2
     assert "rank 5 of 6" in result.stderr
     assert "--axis" not in result.stderr
+
+
+@pytest.fixture(scope="module")
+def inputs(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("inputs")
+    with contextlib.chdir(folder):
+        bad.make_inputs(folder)
+    return folder
+
+
+def test_every_command_is_tried():
+    assert set(bad.CALLS) == set(bad.commands())
+
+
+@pytest.mark.parametrize("words", [words for words, call in bad.CALLS.items() if call])
+def test_some_bad_inputs_of_a_command(inputs, tmp_path, monkeypatch, words):
+    """A few of each command by lot; all of them: ``python -m tests.fuzz --commands``."""
+    shutil.copytree(inputs, tmp_path / "here", symlinks=True)
+    monkeypatch.chdir(tmp_path / "here")
+    every = list(bad.variants(words, bad.commands()[words]))
+    for number in np.random.default_rng(len(every)).permutation(len(every))[:_BY_LOT]:
+        label, call = every[number]
+        assert not bad.complaint(*bad.run(call)), (label, call)
+
+
+@pytest.mark.parametrize("file", bad.CONTENTS)
+def test_some_bad_contents_of_a_file(inputs, tmp_path, monkeypatch, file):
+    shutil.copytree(inputs, tmp_path / "here", symlinks=True)
+    monkeypatch.chdir(tmp_path / "here")
+    every = list(bad.content_variants(file))
+    for number in np.random.default_rng(len(every)).permutation(len(every))[:_BY_LOT]:
+        label, content = every[number]
+        (tmp_path / "here" / file).write_text(content, encoding="utf-8")
+        assert not bad.complaint(*bad.run(bad.CONTENTS[file].split())), label

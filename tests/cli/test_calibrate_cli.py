@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from gfimu import AccelerometerArray, Estimate, Recording, specific_force
+from gfimu.array.gravity import local_gravity
 from gfimu.calibration.registry import METHODS
 from gfimu.calibration.result import load_calibration
-from gfimu.geometry.gravity import local_gravity
 from gfimu.sensor_noise import white_noise
 
 CUBE = AccelerometerArray.load("cube12")

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from gfimu.errors import RecordingWarning
+from gfimu.base.errors import RecordingWarning
 
 PLAN = """
 repeats = 1
@@ -64,9 +64,9 @@ def test_a_wrong_plan_is_one_line_and_writes_nothing(gfimu_command, tmp_path, te
 
 
 def checked(folder, text):
-    from gfimu.commands.campaign_cases import check_factors
-    from sim.sweep.design import Design
-    from sim.sweep.plan import load_plan
+    from sim.trials.campaign.cases import check_factors
+    from sim.trials.sweep.design import Design
+    from sim.trials.sweep.plan import load_plan
 
     (folder / "plan.toml").write_text(text)
     plan = load_plan(folder / "plan.toml")

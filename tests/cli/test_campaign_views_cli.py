@@ -11,8 +11,8 @@ import time
 import pytest
 from matplotlib.image import imread
 
-from sim.sweep.dataset import Dataset
-from sim.sweep.pace import running
+from sim.trials.sweep.dataset import Dataset
+from sim.trials.sweep.pace import running
 
 PLAN = """
 kind = "measure"
@@ -191,7 +191,7 @@ def test_ctrl_c_ends_the_workers_at_once_and_what_is_there_stays(tmp_path):
     code = """
 if __name__ == "__main__":
     import signal
-    from gfimu.cli import main
+    from gfimu.commands.shell.program import main
     signal.signal(signal.SIGINT, signal.default_int_handler)  # which a job in the background ignores
     main()
 """
@@ -214,12 +214,12 @@ if __name__ == "__main__":
 
 
 def test_a_share_is_not_called_a_median(capsys):
-    from gfimu.cli.campaign_views import print_groups
-    from sim.sweep.summary import Group
+    from gfimu.commands.shell.printing import print_blocks
+    from sim.trials.sweep.results import CampaignTable
+    from sim.trials.sweep.summary import Group
 
-    print_groups(
-        "out", [Group({}, "exact", 4, 0, 0.3, 0.75, 0.95, share=True), Group({}, "size_m", 4, 0, 1.0, 2.0, 3.0)]
-    )
+    groups = (Group({}, "exact", 4, 0, 0.3, 0.75, 0.95, share=True), Group({}, "size_m", 4, 0, 1.0, 2.0, 3.0))
+    print_blocks(CampaignTable(groups, (), {}).shown())
     of_share, of_size = capsys.readouterr().out.split("size_m")
     assert "share" in of_share
     assert "median" not in of_share

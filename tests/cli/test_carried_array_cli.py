@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gfimu import AccelerometerArray, Recording
-from gfimu.errors import GfimuError
+from gfimu.base.errors import GfimuError
 from gfimu.recording.formats import open_run
 from sim.simulation import simulate
 
@@ -104,7 +104,7 @@ def test_a_damaged_array_is_one_line(run, tmp_path, gfimu_command):
 
 def live(text, *options):
     return subprocess.run(
-        [sys.executable, "-c", "from gfimu.cli import main; main()", "live", "--rate", "100", *options],
+        [sys.executable, "-m", "gfimu", "live", "--rate", "100", *options],
         input=text, capture_output=True, text=True, timeout=120, check=False,
     )  # fmt: skip
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from gfimu.calibration.result import load_calibration
-from gfimu.importing import inspect_file
 from gfimu.recording import Recording
+from gfimu.recording.importing import inspect_file
 
 
 @pytest.fixture(scope="module")
@@ -69,6 +69,7 @@ def test_a_trial_in_counts_is_read_by_its_map(run):
     assert still == pytest.approx([0.0, -9.807, 0.0, 0.0, -10.1, -1.25], abs=0.02)
 
 
+@pytest.mark.study
 def test_a_trial_is_explained_by_what_was_hidden(run):
     run("D06")
     folder = run("trial.parquet --twin")

@@ -3,18 +3,20 @@
 import re
 
 import pytest
+from every_item import every
 
 from firmware_bridge.frames.format_file import load_format
+from gfimu.array.array import AccelerometerArray
+from gfimu.array.parts.part import Part
 from gfimu.array_search.brief import load_brief
-from gfimu.commands.catalogue import KINDS, TEMPLATES
-from gfimu.files.model_files import find_model, list_models
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.importing import load_map
-from gfimu.parts.part import Part
-from gfimu.uncertainty.stage import Stage
+from gfimu.base.files.model_files import find_model, list_models
+from gfimu.calibration.certificate.stage.stage import Stage
+from gfimu.commands.list import KINDS
+from gfimu.commands.new import TEMPLATES
+from gfimu.recording.importing import load_map
 from sim.chips.data_sheet import DataSheet
 from sim.scenarios import Scenario
-from sim.sweep.plan import load_plan
+from sim.trials.sweep.plan import load_plan
 from sim.twin import Twin
 
 LOADERS = {
@@ -92,7 +94,7 @@ def test_an_unknown_name_is_one_line(gfimu_command, words):
     assert "nothing" in result.stderr
 
 
-@pytest.mark.parametrize("name", sorted(set(list_models("parts")) - {"generic"}))
+@every("name", sorted(set(list_models("parts")) - {"generic"}))
 def test_every_figure_of_a_shipped_part_says_where_it_is_from(name):
     text = find_model("parts", name).read_text(encoding="utf-8")
     sources = set(re.findall(r"^# (\d): ", text, flags=re.MULTILINE))
@@ -106,7 +108,7 @@ def test_every_figure_of_a_shipped_part_says_where_it_is_from(name):
         assert mark in {"unchecked", "derived"} or set(re.findall(r"\d", mark)) <= sources, line
 
 
-@pytest.mark.parametrize("name", list_models("parts"))
+@every("name", list_models("parts"))
 def test_every_shipped_part_has_a_sound_data_sheet(name):
     part, sheet = Part.load(name), DataSheet.load(name)
     assert 1e-7 < part.lsb < 1.0

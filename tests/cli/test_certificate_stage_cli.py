@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from tests.gfimu.uncertainty.stage_cases import calibration_of
+from tests.gfimu.calibration.certificate.stage.stage_cases import calibration_of
 
 
 @pytest.fixture

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from gfimu.cli.completion import effects, shown
-from gfimu.commands.catalogue import catalogue
+from gfimu.commands.list import catalogue
+from gfimu.commands.shell.completion import effects, shown
 
-PROGRAM = [sys.executable, "-c", "from gfimu.cli import main; main()"]
+PROGRAM = [sys.executable, "-c", "from gfimu.commands.shell.program import main; main()"]
 
 
 @pytest.fixture
@@ -122,7 +122,7 @@ def own_home(tmp_path):
     """Return the environment of a user whose home is empty and whose shells find gfimu."""
     program = tmp_path / "bin" / "gfimu"
     program.parent.mkdir()
-    program.write_text(f'#!/bin/sh\nexec {sys.executable} -c "from gfimu.cli import main; main()" "$@"\n')
+    program.write_text(f'#!/bin/sh\nexec {sys.executable} -m gfimu "$@"\n')
     program.chmod(0o755)
     paths = {"PATH": f"{program.parent}:{os.environ['PATH']}", "HOME": str(tmp_path)}
     return {**os.environ, **paths, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
@@ -177,7 +177,7 @@ def test_completion_waits_for_no_heavy_library(line):
     code = """
 import sys
 from pathlib import Path
-from gfimu.cli import main
+from gfimu.commands.shell.program import main
 try:
     main()
 except SystemExit:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from gfimu.motion.estimate import Estimate
+from gfimu import Estimate
 from gfimu.recording import Recording
 
 
@@ -17,7 +17,8 @@ from gfimu.recording import Recording
 def demo(tmp_path_factory):
     """One run of the demo: its folder and its JSON."""
     out = tmp_path_factory.mktemp("demo") / "made"
-    command = [sys.executable, "-c", "from gfimu.cli import main; main()", "demo", "--json", "--out", str(out)]
+    program = "from gfimu.commands.shell.program import main; main()"
+    command = [sys.executable, "-c", program, "demo", "--json", "--out", str(out)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return out, json.loads(done.stdout), done.stderr

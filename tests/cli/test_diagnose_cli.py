@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import json
 import re
+import signal
+import time
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from gfimu import AccelerometerArray, Recording
-from gfimu.files.model_files import find_model
+from gfimu.base.files.model_files import find_model
+from gfimu.diagnosis.time_limit import check_time
 from sim.effects import make_effect
 from sim.motions.motion import SplineSpin
 from sim.scenarios import Scenario
 from sim.simulation import simulate
+from sim.trials.worlds.hidden import Measurement, measure, random_profile
 from sim.twin import Twin
-from sim.worlds.hidden import Measurement, measure, random_profile
 
 TWIN = "cube12_turntable"
 FILES = {"verdict.json", "twin.toml", "report.html", "diagnosis.rrd"}
@@ -85,6 +88,7 @@ def test_a_hidden_cause_is_found_told_and_written(gfimu_command, eccentric, tmp_
     assert gfimu_command("simulate", out / "twin.toml", "--out", tmp_path / "again.parquet").code == 0
 
 
+@pytest.mark.study
 def test_an_uncalibrated_unit_is_told_to_be_calibrated_and_then_only_the_rig_is_left(
     gfimu_command, tmp_path, plain_report
 ):
@@ -208,6 +212,46 @@ def test_hard_input_gets_a_verdict(gfimu_command, ordinary, tmp_path, plain_repo
     assert {file.name for file in (tmp_path / "out").iterdir()} == FILES
 
 
+def signalling(number):
+    """A search during which the program gets a signal; with none it takes longer than any limit."""
+
+    def understood(self, models=None):
+        if number is None:
+            time.sleep(0.2)
+            check_time()
+        signal.raise_signal(number)
+
+    return understood
+
+
+@pytest.mark.parametrize(
+    ("number", "by", "code"),
+    [(None, "time limit", 0), (signal.SIGINT, "Ctrl-C", 130), (signal.SIGTERM, "SIGTERM", 143)],
+)
+@pytest.mark.parametrize("for_machines", [True, False])
+def test_what_is_known_is_written_and_printed_when_it_is_ended(
+    gfimu_command, ordinary, tmp_path, plain_report, monkeypatch, number, by, code, for_machines
+):
+    plain_report()
+    monkeypatch.setattr("gfimu.diagnosis.one_library.LibraryDiagnosis.understood", signalling(number))
+    ordinary.write(tmp_path / "run.parquet")
+    options = ["--time-limit", "0.1"] if number is None else []
+    out = tmp_path / "made"
+    words = ["diagnose", tmp_path / "run.parquet", "--twin", TWIN, "--out", out, *options]
+    done = gfimu_command(*words, *(["--json"] if for_machines else []))
+    assert done.code == code, done.stderr
+    assert done.stderr == f"gfimu: ended by {by} (search); the result is what was known\n"
+    assert {file.name for file in out.iterdir()} == FILES
+    written = json.loads((out / "verdict.json").read_text())
+    assert written["verdict"] == "unknown"
+    assert (written["interrupted"]["by"], written["interrupted"]["done"]) == (by, ["samples"])
+    if for_machines:
+        assert json.loads(done.stdout)["interrupted"] == written["interrupted"]
+    else:
+        assert f"No verdict: the search was interrupted ({by})" in " ".join(done.stdout.split())
+        assert "prediction error, rms" in done.stdout
+
+
 def test_a_dead_channel_is_named_in_the_report(gfimu_command, ordinary, tmp_path):
     dead_channel(ordinary, np.nan).write(tmp_path / "run.parquet")
     done = gfimu_command("diagnose", tmp_path / "run.parquet", "--twin", TWIN, "--out", tmp_path / "out")
@@ -259,6 +303,7 @@ def test_bad_recording(gfimu_command, ordinary, tmp_path, change, words):
         (["--twin", "cube13", "--out", "out"], ["unknown twin 'cube13'", TWIN]),
         (["--twin", "none/twin.toml", "--out", "out"], ["none/twin.toml", "no such file"]),
         (["--twin", TWIN, "--out", "run.parquet"], ["run.parquet", "choose a folder"]),
+        (["--twin", TWIN, "--out", "out", "--time-limit", "0"], ["time limit is 0 s", "above zero"]),
         (["--twin", TWIN, "--out", "out", "--held-out", "gone.csv"], ["gone.csv", "no such file"]),
     ],
 )

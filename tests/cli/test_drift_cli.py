@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import gfimu
-from gfimu.position_drift.closed_forms import position_error
+from gfimu.budget.drift.closed_forms import position_error
 
 MG = 9.80665e-3
 

@@ -15,11 +15,11 @@ import pytest
 
 import gfimu
 import gfimu.commands.score
-from gfimu.cli import output
-from gfimu.errors import GfimuError, WriteError
-from gfimu.files.atomic_file import atomic_path, write_text
+from gfimu.base.errors import GfimuError, WriteError
+from gfimu.base.files.atomic_file import atomic_path, write_text
+from gfimu.commands.shell import output
 
-PROGRAM = [sys.executable, "-c", "from gfimu.cli import main; main()"]
+PROGRAM = [sys.executable, "-c", "from gfimu.commands.shell.program import main; main()"]
 
 
 def one_line(result, *words):
@@ -37,7 +37,7 @@ def broken(monkeypatch, tmp_path):
     def fail(*_, **__):
         raise ZeroDivisionError("first line\nsecond [line]")
 
-    monkeypatch.setattr(gfimu.commands.score, "score", fail)
+    monkeypatch.setattr(gfimu.commands.score, "as_arrays", fail)
     monkeypatch.delenv("GFIMU_DEBUG", raising=False)
 
 
@@ -86,7 +86,7 @@ def test_ctrl_c_is_one_line(gfimu_command, monkeypatch):
     def interrupt(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(gfimu.commands.score, "score", interrupt)
+    monkeypatch.setattr(gfimu.commands.score, "as_arrays", interrupt)
     result = gfimu_command("score", "cube12")
     assert (result.code, result.stderr) == (130, "gfimu: interrupted\n")
 
@@ -104,8 +104,8 @@ def test_a_full_disk_behind_standard_output(form):
         done = subprocess.run(
             [*PROGRAM, "score", "cube12", *form], stdout=full, stderr=subprocess.PIPE, text=True, check=False
         )
-    assert done.returncode == 1
-    assert done.stderr.startswith("gfimu: No space left on device")
+    assert done.returncode == 2
+    assert done.stderr.startswith("gfimu: standard output: No space left on device")
     assert done.stderr.count("\n") == 1
 
 
@@ -186,9 +186,10 @@ def test_an_atomic_write_that_fails_keeps_what_was_there(tmp_path, monkeypatch):
 
 def test_a_check_that_fails_is_code_1(gfimu_command, monkeypatch):
     pytest.importorskip("firmware_bridge.loop.selftest")
-    from firmware_bridge.loop.selftest import SelfTestRow
+    from firmware_bridge.loop.selftest import SelfTestReport, SelfTestRow
 
-    monkeypatch.setattr("gfimu.commands.firmware.selftest", lambda: [SelfTestRow("chips", False, "[nothing]")])
+    report = SelfTestReport((SelfTestRow("chips", False, "[nothing]"),))
+    monkeypatch.setattr("firmware_bridge.loop.selftest.run_selftest", lambda: report)
     result = gfimu_command("firmware", "selftest")
     assert (result.code, result.stderr) == (1, "")
     assert "[nothing]" in result.stdout
@@ -213,9 +214,9 @@ def test_an_error_of_the_system_names_its_file(gfimu_command, monkeypatch):
     def unreadable(*_, **__):
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), "some/file")
 
-    monkeypatch.setattr(gfimu.commands.score, "score", unreadable)
+    monkeypatch.setattr(gfimu.commands.score, "as_arrays", unreadable)
     result = gfimu_command("score")
-    assert (result.code, result.stderr) == (1, "gfimu: some/file: Permission denied\n")
+    assert (result.code, result.stderr) == (2, "gfimu: some/file: Permission denied\n")
 
 
 def test_no_folder_is_made_for_a_file(tmp_path):

@@ -10,7 +10,7 @@ import pytest
 
 import gfimu
 from gfimu import AccelerometerArray, Estimate, Recording, specific_force
-from gfimu.units import STANDARD_GRAVITY
+from gfimu.base.units import STANDARD_GRAVITY
 
 CUBE = AccelerometerArray.load("cube12")
 
@@ -129,7 +129,7 @@ def test_gravity_of_the_place_is_taken_from_the_recording(gfimu_command, tmp_pat
     [
         (("--latitude", "91"), ["latitude 91° is outside"]),
         (("--north-rad", "1"), ["no use without a latitude"]),
-        (("--latitude", "50", "--north-rad", "nan"), ["direction of north"]),
+        (("--latitude", "50", "--north-rad", "nan"), ["--north-rad nan: must be a finite number"]),
         (("--latitude", "50", "--axis", "z"), ["no use with --axis"]),
     ],
 )
@@ -246,17 +246,21 @@ def test_consistency_and_dead_channels_are_printed(gfimu_command, noisy):
 
 
 def test_the_first_call_of_the_filter_says_that_it_compiles(monkeypatch):
-    from gfimu.cli import estimate as command
+    from gfimu.commands.estimate import _doing
+    from gfimu.commands.known_axis import KnownAxis
     from gfimu.rate import first_call
     from gfimu.rate.recursion import forward
 
+    def doing(method):
+        return _doing({"axis": KnownAxis(), "method": method})
+
     monkeypatch.setattr(first_call, "must_compile", lambda: True)
-    assert "compiling" in command._describe("filter")
-    assert "compiling" not in command._describe("integrate")
+    assert "compiling" in doing("filter")
+    assert "compiling" not in doing("integrate")
     monkeypatch.undo()
     if forward.signatures:
         assert not first_call.must_compile()
-        assert command._describe("smoother") == "estimating by smoother"
+        assert doing("smoother") == "estimating by smoother"
 
 
 def test_a_faulty_channel_is_named_in_table_and_json(gfimu_command, tmp_path):

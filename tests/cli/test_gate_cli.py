@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import gfimu
+from gfimu.base.errors import InputError, RecordingWarning
 from gfimu.commands.diagnose import EXPLAINED
-from gfimu.errors import InputError, RecordingWarning
 from gfimu.recording.checks import check_recording, examine
 
 G = 9.80665

@@ -8,11 +8,12 @@ import shlex
 
 import pytest
 import typer
+from every_item import every
 
 import gfimu
-from gfimu.cli.app import program
-from gfimu.cli.command_list import COMMANDS, JOBS
-from gfimu.cli.help_text import examples_of
+from gfimu.commands.shell.command_list import COMMANDS, JOBS
+from gfimu.commands.shell.help_text import examples_of
+from gfimu.commands.shell.program import program
 
 GROUPS = ("benchmark", "campaign", "firmware")
 
@@ -49,7 +50,7 @@ CHEAP = (
 """Examples that need no file and take a second or two."""
 
 
-@pytest.mark.parametrize("words", ALL)
+@every("words", ALL)
 def test_every_command_has_two_examples(words):
     examples = [line for _, line in examples_of(ALL[words].help)]
     assert len(examples) >= 2
@@ -58,7 +59,7 @@ def test_every_command_has_two_examples(words):
     )
 
 
-@pytest.mark.parametrize(("words", "line"), EXAMPLES)
+@every("words, line", EXAMPLES)
 def test_an_example_parses(words, line):
     """Every option in it exists and every value has the type that is asked for."""
     del words
@@ -83,8 +84,8 @@ def test_a_cheap_example_runs(gfimu_command, tmp_path, monkeypatch, line):
     assert (result.code, result.stderr) == (0, "")
 
 
-@pytest.mark.parametrize("words", ALL)
 @pytest.mark.parametrize("width", [40, 80])
+@every("words", ALL)
 def test_help_fits_the_terminal(gfimu_command, monkeypatch, words, width):
     monkeypatch.setenv("COLUMNS", str(width))
     text = gfimu_command(*words.split(), "--help").stdout
@@ -95,7 +96,7 @@ def test_help_fits_the_terminal(gfimu_command, monkeypatch, words, width):
         assert [line for line in examples.splitlines() if len(line) > width] == []
 
 
-@pytest.mark.parametrize("words", ALL)
+@every("words", ALL)
 def test_an_example_can_be_copied(gfimu_command, monkeypatch, words):
     """With its continuation lines joined, what is printed is the command line."""
     monkeypatch.setenv("COLUMNS", "60")
@@ -103,6 +104,17 @@ def test_an_example_can_be_copied(gfimu_command, monkeypatch, words):
     lines = re.sub(r" \\\n\s*", " ", text.partition("\nExamples:\n")[2])
     printed = {line.strip() for line in lines.splitlines()}
     assert {line for _, line in examples_of(ALL[words].help)} <= printed
+
+
+def test_examples_of_the_shell_are_no_part_of_the_documentation_in_python():
+    assert "gfimu firmware trace --out trace.rrd" in " ".join(
+        line for words, line in EXAMPLES if words == "firmware trace"
+    )
+    text = gfimu.firmware.trace.__doc__
+    assert "Parameters\n" in text
+    assert "Raises\n" in text
+    assert "Shell" not in text
+    assert "--out" not in text
 
 
 @pytest.mark.parametrize("words", [("help", "score"), ("score", "-h"), ("score", "--help")])

@@ -5,8 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.geometry.kinematics import specific_force
+from gfimu import AccelerometerArray, specific_force
 from gfimu.recording import Recording
 
 PEAK = 4000.0  # rad/s²

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from gfimu.array.array import AccelerometerArray
 from gfimu.diagnosis import diagnose
-from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
 from sim.effects import make_effect
+from sim.trials.worlds.hidden import Measurement, measure
 from sim.twin import Twin
-from sim.worlds.hidden import Measurement, measure
 
 TWIN = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
 

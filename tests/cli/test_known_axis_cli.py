@@ -4,8 +4,7 @@ import json
 
 import numpy as np
 
-from gfimu.geometry.array import AccelerometerArray, Chip
-from gfimu.geometry.turning_axis import TurningAxis
+from gfimu import AccelerometerArray, Chip, TurningAxis
 from gfimu.recording import Recording
 
 

@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 
 from firmware_bridge.host.journal import Journal
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.array.array import AccelerometerArray
 from gfimu.rate.filter import filter_rate
 from gfimu.rate.sensing import SensorErrors
 
 CUBE = AccelerometerArray.load("cube12")
 RATE = 100.0
-PROGRAM = "from gfimu.cli import main; main()"
+PROGRAM = "from gfimu.commands.shell.program import main; main()"
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ import matplotlib.image
 import numpy as np
 import pytest
 
-from gfimu.geometry.array import AccelerometerArray
+from gfimu import AccelerometerArray
 
 BRIEF = """
 chips = 4
@@ -153,7 +153,7 @@ def test_bad_sites_end_with_one_line(gfimu_command, here, csv, message):
         ),
         (["--chips", "4", "--pareto", "gdop", "chips", "--front", "x", "--out", "y.toml"], "leave out --out"),
         (["--chips", "4", "--pareto", "gdop", "chips", "--front", "x", "--most-chips", "3"], "must exceed 4"),
-        (["--chips", "4", "--box-m", "0.1", "nan", "0.1"], "three edges"),
+        (["--chips", "4", "--box-m", "0.1", "nan", "0.1"], "--box-m 0.1 nan 0.1: must be a finite number"),
         (["none.toml"], "none.toml: no such file"),
         ([], "give chips in the brief, or --chips"),
     ],

@@ -10,10 +10,12 @@ from typing import get_type_hints
 
 import pytest
 import typer
+from every_item import every
 
 import gfimu
-from gfimu.cli.app import program
-from gfimu.files.outputs import OutputFile, OutputFolder
+from gfimu.base.files.outputs import OutputFile, OutputFolder
+from gfimu.commands.shell.declare import command_of
+from gfimu.commands.shell.program import program
 
 OTHER_WORDS = {
     "--from": "source",
@@ -120,23 +122,49 @@ def filer(name):
     return FILES_OF.get(name, COMMANDS[name][1])
 
 
+def written_by(name):
+    """What the function under a command writes, by argument."""
+    declared = command_of(filer(name))
+    return {argument: option.writes for argument, option in declared.options.items() if option.writes is not None}
+
+
+def read_by(name):
+    """The arguments that name files to read, those of groups of options by their own names."""
+    declared = command_of(filer(name))
+    marks = {**declared.options, **options_of_groups(filer(name))}
+    return [argument for argument, option in marks.items() if option.reads]
+
+
+def options_of_groups(function):
+    """The options that stand for one argument of a function, by their own names."""
+    return {
+        name: mark
+        for group in command_of(function).groups.values()
+        for name, parameter in group.parameters.items()
+        for mark in parameter.annotation.__metadata__
+    }
+
+
 def parameters_of(name):
     return [p for p in COMMANDS[name][0].params if not NO_ARGUMENT & set(p.opts)]
 
 
-@pytest.mark.parametrize("name", COMMANDS)
+@every("name", COMMANDS)
 def test_every_option_is_an_argument_of_the_function(name):
     functions = [COMMANDS[name][1], *BESIDE.get(name, ())]
     arguments = {argument for function in functions for argument in inspect.signature(function).parameters}
+    arguments.update(*map(options_of_groups, functions))
     assert {argument_of(parameter) for parameter in parameters_of(name)} <= arguments
 
 
-@pytest.mark.parametrize("name", COMMANDS)
+@every("name", COMMANDS)
 def test_every_path_is_declared_as_read_or_written(name):
     """A new option that writes but is not declared fails here, and so does one that reads a file."""
-    command, function = COMMANDS[name][0], filer(name)
-    hints = get_type_hints(inspect.unwrap(command.callback))
-    written, read = getattr(function, "__outputs__", {}), getattr(function, "__reads__", ())
+    command = COMMANDS[name][0]
+    callback = inspect.unwrap(command.callback)
+    hints = {one: str(parameter.annotation) for one, parameter in inspect.signature(callback).parameters.items()}
+    hints |= get_type_hints(callback)
+    written, read = written_by(name), read_by(name)
     for parameter in parameters_of(name):
         argument, text = argument_of(parameter), getattr(parameter, "help", "") or ""
         if "Path" in str(hints[parameter.name]):
@@ -155,7 +183,7 @@ def test_the_docs_list_every_command_with_its_function(project_root):
     assert rows == {name: PYTHON_NAME.get(name, name.replace(" ", ".")) for name in COMMANDS}
     for flag, argument in OTHER_WORDS.items():
         assert f"`{flag}` is `{argument}`" in page
-    written = {suffix for name in COMMANDS for output in getattr(filer(name), "__outputs__", {}).values()
+    written = {suffix for name in COMMANDS for output in written_by(name).values()
                if isinstance(output, OutputFile) for suffix in output.suffixes}  # fmt: skip
     assert all(f"`{suffix}`" in page for suffix in written)
 
@@ -172,10 +200,10 @@ def call(name, values):
 
 
 def argument_is_file(name, argument):
-    return isinstance(filer(name).__outputs__[argument], OutputFile)
+    return isinstance(written_by(name)[argument], OutputFile)
 
 
-OUTPUTS = [(name, argument) for name in COMMANDS for argument in getattr(filer(name), "__outputs__", {})]
+OUTPUTS = [(name, argument) for name in COMMANDS for argument in written_by(name)]
 
 
 FILES = [(name, argument) for name, argument in OUTPUTS if argument_is_file(name, argument)]
@@ -207,7 +235,7 @@ def output_name(output, folder="."):
 
 @pytest.mark.parametrize(("name", "argument"), OUTPUTS)
 def test_a_folder_that_is_not_there_is_not_made(gfimu_command, here, name, argument):
-    output = filer(name).__outputs__[argument]
+    output = written_by(name)[argument]
     before = contents(here)
     values = CALLS[name] | {argument: output_name(output, "typo")}
     refused(gfimu_command(*call(name, values)), before, here, "there is no folder typo", "choose a folder")
@@ -215,7 +243,7 @@ def test_a_folder_that_is_not_there_is_not_made(gfimu_command, here, name, argum
 
 @pytest.mark.parametrize(("name", "argument"), FILES)
 def test_a_wrong_extension_is_refused(gfimu_command, here, name, argument):
-    output = filer(name).__outputs__[argument]
+    output = written_by(name)[argument]
     before = contents(here)
     result = gfimu_command(*call(name, CALLS[name] | {argument: "made.xls"}))
     refused(result, before, here, "made.xls", output.suffixes[0])
@@ -223,10 +251,9 @@ def test_a_wrong_extension_is_refused(gfimu_command, here, name, argument):
 
 @pytest.mark.parametrize(("name", "argument"), OUTPUTS)
 def test_an_output_that_is_an_input_is_refused(gfimu_command, here, name, argument):
-    function = filer(name)
-    output = function.__outputs__[argument]
+    output = written_by(name)[argument]
     options = {argument_of(parameter) for parameter in parameters_of(name)}
-    for read in (reads for reads in function.__reads__ if reads in options):
+    for read in (reads for reads in read_by(name) if reads in options):
         if isinstance(output, OutputFolder):
             (here / "made").mkdir(exist_ok=True)
             (here / "made" / output.names[0]).write_text("kept")

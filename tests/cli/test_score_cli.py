@@ -4,8 +4,8 @@ import json
 
 import pytest
 
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.geometry.observability import seeing_arrays
+from gfimu.array.array import AccelerometerArray
+from gfimu.array.observability import seeing_arrays
 
 
 def test_without_arguments_compares_every_shipped_array(gfimu_command):

@@ -1,20 +1,19 @@
-"""One thing has one name: options that several commands take, their help, their defaults, and their former names."""
+"""One thing has one name: options that several commands take, their help and their defaults."""
 
 from __future__ import annotations
 
-import inspect
-import json
 import re
-import warnings
 from collections import defaultdict
 
 import pytest
 import typer
+from every_item import every
 
 import gfimu
-from gfimu.cli.app import program
-from gfimu.cli.former_options import FORMER_OPTIONS
-from gfimu.cli.shared_options import SHARED
+from gfimu.commands import known_axis, place
+from gfimu.commands.shell import options as shared
+from gfimu.commands.shell.declare import Group, Option, marked
+from gfimu.commands.shell.program import program
 
 OF_ITS_OWN = {
     "--array": {"firmware build"},  # a name that the board states, no array that is read
@@ -33,6 +32,7 @@ SAME_DEFAULT = (
     "--inclination-rad",
     "--json",
     "--map",
+    "--max-memory",
     "--rrd",
 )
 
@@ -60,7 +60,7 @@ def options():
     for words, command in COMMANDS.items():
         for param in command.params:
             if param.param_type_name == "option":
-                yield max(param.opts, key=len) if "--live" not in param.opts else "--live", words, param
+                yield max(param.opts, key=len), words, param
 
 
 BY_NAME = defaultdict(dict)
@@ -68,23 +68,31 @@ for option, where, one in options():
     BY_NAME[option][where] = one
 
 
-@pytest.mark.parametrize("name", sorted(name for name, where in BY_NAME.items() if len(where) > 1))
-def test_an_option_of_two_commands_comes_from_the_table(name):
+def declared():
+    """Yield the options that are declared for several commands, by their names on the shell."""
+    for module in (shared, known_axis, place):
+        for name, value in vars(module).items():
+            if isinstance(value, Option):
+                yield value.flag(name.lower()), value
+            if isinstance(value, Group):
+                yield from ((option.flag(name), option) for name, option in marked(value.parameters, Option).items())
+
+
+SHARED = {**dict(reversed([*declared()])), "--json": Option("Print one JSON object instead of tables")}
+
+
+@every("name", sorted(name for name, where in BY_NAME.items() if len(where) > 1))
+def test_an_option_of_two_commands_is_declared_once(name):
     own = OF_ITS_OWN.get(name, set())
     for words, param in BY_NAME[name].items():
         if own is None or words in own:
             continue
-        assert name in SHARED, f"{words} {name}: describe it in gfimu/cli/shared_options.py"
+        assert name in SHARED, f"{words} {name}: declare it in gfimu/commands/shell/options.py"
         assert SHARED[name].text.rstrip(".") in param.help, f"{words} {name}: {param.help}"
         assert (param.metavar or "") == SHARED[name].metavar, words
 
 
-@pytest.mark.parametrize("name", sorted(SHARED))
-def test_the_table_has_no_option_that_one_command_takes_alone(name):
-    assert len(BY_NAME[name]) > 1
-
-
-@pytest.mark.parametrize("name", SAME_DEFAULT)
+@every("name", SAME_DEFAULT)
 def test_a_shared_option_has_one_default(name):
     defaults = {str(param.default) for words, param in BY_NAME[name].items() if words not in OF_ITS_OWN.get(name, ())}
     assert len(defaults) == 1, defaults
@@ -103,24 +111,20 @@ def test_every_command_takes_json():
     assert {param.name for param in BY_NAME["--json"].values()} == {"json"}
 
 
-@pytest.mark.parametrize("words", sorted(BY_NAME["--out"]))
+@every("words", sorted(BY_NAME["--out"]))
 def test_an_output_says_what_is_written(words):
     assert re.search(r"\bto write\b", BY_NAME["--out"][words].help), BY_NAME["--out"][words].help
 
 
-@pytest.mark.parametrize(
-    ("words", "param"),
-    [
-        pytest.param(words, param, id=f"{words} {name}")
-        for name, words, param in options()
-        if "float" in str(param.type_descriptor.annotation)
-    ],
+@every(
+    "words, param",
+    [(words, param) for _, words, param in options() if "float" in str(param.type_descriptor.annotation)],
 )
 def test_a_number_says_its_unit(words, param):
     assert UNITS.search(param.help), f"{words}: {param.help}"
 
 
-@pytest.mark.parametrize("words", sorted(COMMANDS))
+@every("words", sorted(COMMANDS))
 def test_descriptions_are_sentences(words):
     for param in COMMANDS[words].params:
         if param.param_type_name == "option" and not param.hidden and "--help" not in param.opts:
@@ -134,37 +138,12 @@ def test_descriptions_are_sentences(words):
             assert param.help.rstrip().endswith((".", "?")), param.help
 
 
-@pytest.mark.parametrize(
-    ("words", "former", "present"),
-    [(words, *pair) for words, renamed in FORMER_OPTIONS.items() for pair in renamed.items()],
-)
-def test_a_former_name_is_hidden_and_its_present_one_is_there(gfimu_command, words, former, present):
-    help_text = gfimu_command(*words.split(), "--help").stdout
-    assert re.search(rf"{present}\b", help_text)
-    known = {name for param in COMMANDS[words].params for name in param.opts}
-    assert present in known
-    assert former not in known
-
-
-def test_a_former_name_works_with_one_line_that_says_so(gfimu_command):
-    now = gfimu_command("drift", "--bias-mg", 1, "--duration", 2, "--json")
-    before = gfimu_command("drift", "--bias-mg", 1, "--time", 2, "--json")
-    assert (before.code, json.loads(before.stdout)) == (0, json.loads(now.stdout))
-    assert before.stderr == "gfimu: warning: --time is now called --duration; use that name\n"
-    assert now.stderr == ""
-    assert gfimu_command("drift", "--bias-mg", 1, "--time=2", "--json").stdout == now.stdout
-
-
-def test_former_names_of_arguments_work_in_python():
-    with pytest.warns(DeprecationWarning, match="drift: time is now called duration"):
-        before = gfimu.drift("cube12", time=2.0, bias_mg=1.0)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        now = gfimu.drift("cube12", duration=2.0, bias_mg=1.0)
-    assert before.budget.time == now.budget.time == 2.0
-    with pytest.raises(TypeError, match="give one of them"):
-        gfimu.drift("cube12", time=2.0, duration=2.0, bias_mg=1.0)
-    assert "duration" in inspect.signature(gfimu.drift).parameters
+def test_a_wrong_keyword_names_the_right_one_as_on_the_shell(gfimu_command):
+    assert "did you mean --spin-axis?" in gfimu_command("score", "cube12", "--spinaxis", "z").stderr
+    with pytest.raises(TypeError, match=r"score\(\) has no argument 'spinaxis'; did you mean 'spin_axis'\?"):
+        gfimu.score("cube12", spinaxis="z")
+    with pytest.raises(TypeError, match=r"no argument 'axis_point'; it is part of axis: .*TurningAxis\.of"):
+        gfimu.score("cube12", axis_point=(0.0, 0.0, 0.1))
 
 
 def test_a_picture_may_have_an_extension_in_capitals(gfimu_command, tmp_path):

@@ -20,14 +20,14 @@ pytestmark = pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="
 TAKES_CTRL_C = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
 """A background job of a shell ignores SIGINT; a process of these tests does not."""
 
-PROGRAM = TAKES_CTRL_C + "from gfimu.cli import main; main()"
+PROGRAM = TAKES_CTRL_C + "from gfimu.commands.shell.program import main; main()"
 
 BEGUN = (
     TAKES_CTRL_C
     + """
 import sys, time
-from gfimu.cli import output
-usual = output.progress
+from gfimu.commands.shell import output
+usual, output._LINE_S = output.progress, 1e6
 import contextlib
 @contextlib.contextmanager
 def progress(*words, **more):
@@ -35,7 +35,7 @@ def progress(*words, **more):
     with usual(*words, **more) as done:
         yield done
 output.progress = progress
-from gfimu.cli import main
+from gfimu.commands.shell.program import main
 main()
 """
 )
@@ -52,7 +52,7 @@ duration_s = [6.0]
 
 CALLS = {
     "estimate": "long.parquet --method smoother --array cube12 --out made.parquet",
-    "simulate": "paper_run --set duration_s=20000 --set sample_rate_hz=1000 --out made.parquet",
+    "simulate": "paper_run --set duration_s=20000 --set sample_rate_hz=1000 --max-memory 30GB --out made.parquet",
     "noise": "long.parquet --stretch all --kalibr made.yaml",
     "optimize": "--chips 12 --restarts 5000 --objective fault --out made.toml",
     "calibrate": "array poses.parquet --motion long.parquet --out made.json",
@@ -107,6 +107,24 @@ def whole(folder):
     """Refuse half-written files."""
     assert not list(folder.rglob(".gfimu-*"))
     assert not list(folder.glob("made.*"))
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_that_a_library_of_c_swallows_is_sent_again(number):
+    script = TAKES_CTRL_C + (
+        "import ctypes, time\n"
+        "from gfimu.commands.shell.stop_signals import stop_signals\n"
+        f"callback = ctypes.CFUNCTYPE(None)(lambda: signal.raise_signal({int(number)}))\n"
+        "with stop_signals() as stop:\n"
+        "    try:\n"
+        "        callback()\n"
+        "        time.sleep(10)\n"
+        "        print('went on')\n"
+        "    except KeyboardInterrupt:\n"
+        "        print(stop.code)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert (done.stdout, done.stderr) == (f"{128 + number}\n", "")
 
 
 @pytest.mark.parametrize("name", CALLS)

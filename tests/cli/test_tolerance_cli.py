@@ -42,7 +42,8 @@ def test_simulated_units_stand_beside_first_order(gfimu_command, monkeypatch):
 
 
 def test_json_is_the_result_of_the_function(gfimu_command):
-    call = {"units": 10, "workers": 1, "calibrated": ["rest"], "duration": 2.5, "seed": 3, "bias_mg": 10.0}
+    chip = gfimu.ChipErrors(bias_m_s2=0.0980665)
+    call = {"units": 10, "workers": 1, "calibrated": ["rest"], "duration": 2.5, "seed": 3, "chip": chip}
     data = json.loads(
         gfimu_command(
             "tolerance", "p1_face_diagonals", "--units", 10, "--workers", 1, "--calibrated", "rest", "--duration", 2.5,
@@ -87,7 +88,7 @@ def test_a_body_in_free_motion(gfimu_command):
 
 def test_an_array_of_which_no_unit_can_be_estimated(gfimu_command, tmp_path):
     result = gfimu_command(
-        "tolerance", "p2_face_centres", *FEW, "--calibrated", "none", "--out", tmp_path / "diverged.png"
+        "tolerance", "p2_face_centres", *FEW, "--calibrated", "none", "--picture", tmp_path / "diverged.png"
     )
     assert result.code == 0
     assert "10 units could not be estimated: the rate diverges" in result.stdout
@@ -106,7 +107,7 @@ def test_picture_of_nothing(gfimu_command, tmp_path):
     zero = ["--position-mm", "--angle-deg", "--bias-mg", "--gain-percent", "--cross-axis-percent", "--noise-ug"]
     zero += ["--nonlinearity-percent", "--temperature-k"]
     words = [word for option in zero for word in (option, 0)]
-    result = gfimu_command("tolerance", "cube12", "--closed-form", *words, "--out", tmp_path / "nothing.png")
+    result = gfimu_command("tolerance", "cube12", "--closed-form", *words, "--picture", tmp_path / "nothing.png")
     assert result.code == 0
     assert (tmp_path / "nothing.png").exists()
 

@@ -80,7 +80,7 @@ def check_what_its_makers_state(board):
     assert "as if each were sampled at an instant of its own" in board.unexplained.signature
     assert "channel m41 has a tone" in board.unexplained.signature
     # Chips on clocks of their own: the innovations of the rate filter say 1.5 ms.
-    assert board.noise["disagreement_s"] == pytest.approx(1.5e-3, rel=0.4)
+    assert board.noise.disagreement_s == pytest.approx(1.5e-3, rel=0.4)
     assert board.gain.held_out == "another recording"
     assert board.gain.log_likelihood_per_sample > 5 * board.gain.log_likelihood_std
 

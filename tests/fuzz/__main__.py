@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 from tests.fuzz.campaign import run, work
+from tests.fuzz.commands import run_all
 
 
 def main() -> int:
@@ -16,11 +17,14 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--reader", help="one reader; all by default")
     parser.add_argument("--keep", type=Path, default=Path("fuzz-failures"), help="folder for the inputs that failed")
+    parser.add_argument("--commands", nargs="?", const="", help="every command, or one, with bad input instead")
     parser.add_argument("--worker", type=int, help=argparse.SUPPRESS)
     given = parser.parse_args()
     if given.worker is not None:
         work(given.worker, given.count, given.seed, given.reader, given.keep)
         return 0
+    if given.commands is not None:
+        return int(bool(run_all(given.commands or None)))
     tallies = run(given.count, given.seed, given.reader, given.keep, progress=given.count > 5000)
     print("| reader | inputs | read | refused | uncaught | slowest, s | CPU, s |\n|---|---|---|---|---|---|---|")
     for name, one in sorted(tallies.items()):

@@ -179,7 +179,7 @@ def work(first: int, count: int, seed: int, only: str | None, keep: Path) -> Non
 
 def _ended(call: Any, file: Path, memory: int) -> tuple[str, float, str]:
     """Read one input: how it ended, CPU time, and where an error came from that is not one of gfimu's."""
-    from gfimu.errors import GfimuError
+    from gfimu import GfimuError
 
     soft, hard = resource.getrlimit(resource.RLIMIT_AS)
     start, trace = time.process_time(), ""

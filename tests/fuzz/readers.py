@@ -14,7 +14,7 @@ import numpy as np
 __all__ = ["Target", "targets"]
 
 _LONGEST = 20_000  # bytes of a text, so that most inputs take milliseconds
-_IMPORTING = Path(__file__).parents[1] / "gfimu" / "importing"
+_IMPORTING = Path(__file__).parents[1] / "gfimu" / "recording" / "importing"
 
 
 @dataclass(frozen=True)
@@ -43,14 +43,14 @@ def targets(folder: Path) -> dict[str, Target]:
     import field_files
     import foreign_files as foreign
 
+    from gfimu.array.array import AccelerometerArray
+    from gfimu.array.parts.part import Part
+    from gfimu.base.files.model_files import list_models
     from gfimu.calibration.imu_tk import read_text_triad
     from gfimu.calibration.result import load_calibration
-    from gfimu.files.model_files import list_models
-    from gfimu.geometry.array import AccelerometerArray
-    from gfimu.importing import inspect_file, load_map
-    from gfimu.joining import open_reference
-    from gfimu.parts.part import Part
     from gfimu.recording.formats import open_recording, open_run
+    from gfimu.recording.importing import inspect_file, load_map
+    from gfimu.recording.joining import open_reference
     from sim.rigs.mjcf_array import array_from_mjcf
     from sim.scenarios import Scenario
     from sim.twin import Twin
@@ -133,7 +133,7 @@ def _own_recordings(folder: Path) -> dict[str, tuple[tuple[bytes, str], ...]]:
 
 def _foreign(folder: Path, foreign: Any, field: Any) -> tuple[tuple[tuple[bytes, str], ...], Mapping[str, Any]]:
     """Return foreign text files, and foreign files of other formats by the name of the format."""
-    from gfimu.importing.readers.registry import format_of
+    from gfimu.recording.importing.readers.registry import format_of
 
     found: dict[str, list[tuple[bytes, str]]] = {
         key: [] for key in ("text", "json", "zip", "excel", "matlab", "hdf5", "ulog", "mcap", "rosbag")
@@ -231,7 +231,7 @@ def _sent() -> tuple[tuple[bytes, str], ...]:
 
 def _frames(path: Path) -> None:
     from firmware_bridge.frames.decoder import SampleDecoder
-    from gfimu.files.input_file import read_bytes
+    from gfimu.base.files.input_file import read_bytes
 
     decoder = SampleDecoder()
     data = read_bytes(path)

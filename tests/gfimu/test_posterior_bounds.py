@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from gfimu.bounds.posterior import posterior_rate_bound
-from gfimu.bounds.sample import alpha_std, steady_rate_bound
-from gfimu.errors import InputError
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import InputError
+from gfimu.rate.bounds.posterior import posterior_rate_bound
+from gfimu.rate.bounds.sample import alpha_std, steady_rate_bound
 from gfimu.rate.sensing import SensorErrors
 
 CUBE = AccelerometerArray.load("cube12")
@@ -71,7 +71,7 @@ def test_smoother_equals_the_inverse_of_the_whole_information(noise):
     t = np.arange(n) * period
     errors = SensorErrors.uniform(CUBE, noise, bias)
     bound = posterior_rate_bound(CUBE, t, rates, errors, start_std=0.5, smoother=True)
-    from gfimu.bounds.sample import omega_products_jacobian
+    from gfimu.rate.bounds.sample import omega_products_jacobian
     from gfimu.rate.sensing import ChannelTables
 
     tables = ChannelTables(CUBE, errors)

@@ -5,8 +5,11 @@ import importlib
 import inspect
 
 import pytest
+from every_item import every
 
 import gfimu
+
+PUBLIC = sorted(set(gfimu.__all__) - {"__version__"})
 
 NO_EXAMPLE = {
     "CorruptValueWarning",
@@ -29,7 +32,7 @@ def of_name(name):
     return inspect.unwrap(value) if callable(value) and not inspect.isclass(value) else value
 
 
-@pytest.mark.parametrize("name", gfimu._PUBLIC)
+@every("name", PUBLIC)
 def test_a_public_name_says_what_it_is(name):
     text = inspect.getdoc(of_name(name)) or ""
     assert len(text.splitlines()[0]) > 10
@@ -38,7 +41,7 @@ def test_a_public_name_says_what_it_is(name):
 
 
 @pytest.mark.filterwarnings("ignore")
-@pytest.mark.parametrize("name", [name for name in gfimu._PUBLIC if name not in NO_EXAMPLE])
+@pytest.mark.parametrize("name", [name for name in PUBLIC if name not in NO_EXAMPLE])
 def test_its_example_runs(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     value = of_name(name)

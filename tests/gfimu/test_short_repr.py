@@ -3,14 +3,14 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
+from every_item import every
 
 import gfimu
 from gfimu import AccelerometerArray, Recording, SensorErrors
+from gfimu.array.linear_solution import linear_solution
+from gfimu.array.parts.part import Part
+from gfimu.base.short_repr import short_repr
 from gfimu.diagnosis.design.distinguishability import Distinguishability
-from gfimu.geometry.linear_solution import linear_solution
-from gfimu.parts.part import Part
-from gfimu.short_repr import short_repr
 from sim.chips.data_sheet import DataSheet
 from sim.scenarios import Scenario
 from sim.twin import Twin
@@ -53,7 +53,7 @@ MAKERS = {
 }
 
 
-@pytest.mark.parametrize("make", MAKERS.values(), ids=MAKERS)
+@every("make", MAKERS.values())
 def test_at_most_two_lines_and_no_array(make):
     result = make()
     text = repr(result)

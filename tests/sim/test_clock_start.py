@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gfimu.world_model import SpinState
+from gfimu.model.world_model import SpinState
 from sim.effects import make_effect
+from sim.trials.worlds.hidden import random_profile
 from sim.twin import Twin
-from sim.worlds.hidden import random_profile
 
 TWIN = Twin.load("cube12_turntable")
 FAST = make_effect("clock_error", {"ratio": 0.004})

@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 import gfimu
 from gfimu import AccelerometerArray, EarthRotation
-from gfimu.geometry.gravity import EARTH_RATE, local_gravity
+from gfimu.array.gravity import EARTH_RATE, local_gravity
 from sim.earth import earth_readings
 from sim.motions.motion import BodyState
 from sim.scenarios import Scenario

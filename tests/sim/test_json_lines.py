@@ -4,7 +4,7 @@ import lzma
 
 import pytest
 
-from gfimu.errors import InputError
+from gfimu import InputError
 from sim import json_lines
 from sim.json_lines import read_lines, six_digits, write_lines
 

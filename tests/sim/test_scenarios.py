@@ -5,10 +5,10 @@ import json
 import numpy as np
 import pytest
 
-from gfimu.errors import InputError
-from gfimu.files.model_files import list_models
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.geometry.kinematics import specific_force
+from gfimu.array.array import AccelerometerArray
+from gfimu.array.kinematics import specific_force
+from gfimu.base.errors import InputError
+from gfimu.base.files.model_files import list_models
 from gfimu.recording import Recording
 from sim.effects import make_effect
 from sim.rigs.turntable import prescribed_readings

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from firmware_bridge.frames.decoder import StreamCounts
 from firmware_bridge.host.mounting.on_board import mounting_words
 from firmware_bridge.host.record_session import Batch
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.array.array import AccelerometerArray
 from gfimu.recording import Recording
 from gfimu.recording.checks import Finding, check_recording
 

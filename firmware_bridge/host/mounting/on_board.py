@@ -11,9 +11,9 @@ from firmware_bridge.frames.decoder import FrameFormat
 from firmware_bridge.host.finder import Listener, has_speed
 from firmware_bridge.host.line_up import line_up
 from firmware_bridge.host.link import Chunk, Link
-from gfimu.errors import InputError
-from gfimu.files.model_files import list_models
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import InputError
+from gfimu.base.files.model_files import list_models
 
 __all__ = [
     "ArrayOnBoard",

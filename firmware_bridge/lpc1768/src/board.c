@@ -267,13 +267,20 @@ void hal_timer_start(uint32_t rate_hz)
     T0MR0 = ((CORE_HZ + (rate_hz / 2U)) / rate_hz) - 1U;
     T0MCR = TIMER_MR0_INTERRUPT | TIMER_MR0_RESET;
     T0IR = 1U;
+    barrier(); /* the timer requests nothing any more: what it requested before its stop is forgotten */
+    NVIC_ICPR0 = 1U << IRQ_TIMER0;
+    NVIC_ISER0 = 1U << IRQ_TIMER0;
     T0TCR = TIMER_ENABLE;
 }
 
+/* The interrupt is withdrawn at the NVIC before the timer stops: behind the barrier the processor can't enter its handler,
+ * whatever was pending (ARM application note 321, 4.9). UART and SysTick go on being served, as they would not if
+ * interrupts were off for as long as the chips are set up. */
 void hal_timer_stop(void)
 {
+    NVIC_ICER0 = 1U << IRQ_TIMER0;
+    barrier();
     T0TCR = 0U;
-    T0IR = 1U;
 }
 
 /* The counter goes from 0 at one sample to MR0 at the next. */
@@ -328,11 +335,13 @@ bool hal_baud_possible(uint32_t baud)
 void hal_set_baud(uint32_t baud)
 {
     struct baud_setting setting = find_baud(baud);
+    hal_lock(); /* a byte that comes now must not be fetched: the divisor lies in the place of the receiver */
     U0LCR = UART_LCR_DIVISOR | UART_LCR_8N1;
     U0DLL = setting.divisor & 0xFFU;
     U0DLM = setting.divisor >> 8;
     U0FDR = setting.fraction;
     U0LCR = UART_LCR_8N1;
+    hal_unlock();
 }
 
 static void uart_init(void)
@@ -486,7 +495,7 @@ int main(void)
     core_init(cause, GFIMU_BOOT_BAUD);
     NVIC_PRIORITY(IRQ_TIMER0) = PRIORITY_SAMPLE << NVIC_PRIORITY_SHIFT;
     NVIC_PRIORITY(IRQ_UART0) = PRIORITY_UART << NVIC_PRIORITY_SHIFT;
-    NVIC_ISER0 = (1U << IRQ_TIMER0) | (1U << IRQ_UART0);
+    NVIC_ISER0 = 1U << IRQ_UART0;
     wake_init();
     watchdog_feed();
 #if GFIMU_AUTOSTART

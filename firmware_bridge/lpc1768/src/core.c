@@ -280,8 +280,16 @@ static void set_pace(void)
     core.chip.fifo_ctl = pace ? ADXL345_STREAM : ADXL345_NEWEST;
 }
 
+/* The chips and their configuration belong to the sampling while the timer runs. Whatever else uses them stops it first. */
+static void stop(void)
+{
+    hal_timer_stop();
+    core.streaming = false;
+}
+
 void core_start(void)
 {
+    stop();
     for (uint32_t sensor = 0U; keeps_pace() && (sensor < SENSOR_COUNT); sensor++) {
         adxl345_clear_fifo(sensor, &core.chip); /* conversions from before belong to no sample */
     }
@@ -294,12 +302,6 @@ void core_start(void)
     core.streaming = true;
     core.last_sample_us = hal_time_us();
     hal_timer_start(core.rate_hz);
-}
-
-static void stop(void)
-{
-    hal_timer_stop();
-    core.streaming = false;
 }
 
 static bool has_converted(uint32_t sensor)
@@ -538,13 +540,15 @@ static bool line_carries(uint32_t baud, uint32_t rate_hz)
     return (rate_hz * BITS_PER_FRAME) < baud;
 }
 
-/* Changes the sensors' configuration with the sample timer at rest. */
-static void reconfigure(void)
+/* Changes the sample rate and the sensors' configuration with the sample timer at rest. */
+static void reconfigure(uint32_t rate_hz, uint32_t bw_rate, uint32_t data_format)
 {
     bool streaming = core.streaming;
-    if (streaming) {
-        stop();
-    }
+    stop();
+    core.rate_hz = rate_hz;
+    core.chip.bw_rate = (uint8_t)bw_rate;
+    core.chip.data_format = (uint8_t)data_format;
+    set_pace();
     configure_sensors();
     if (streaming) {
         core_start();
@@ -560,10 +564,7 @@ static uint32_t set_rate(uint32_t rate_hz, uint32_t code)
     } else if (!line_carries(core.baud, rate_hz)) {
         result = RESULT_LINE_TOO_SLOW;
     } else {
-        core.rate_hz = rate_hz;
-        core.chip.bw_rate = (code == RATE_CODE_AUTO) ? adxl345_rate_code(rate_hz) : (uint8_t)code;
-        set_pace();
-        reconfigure();
+        reconfigure(rate_hz, (code == RATE_CODE_AUTO) ? adxl345_rate_code(rate_hz) : code, core.chip.data_format);
     }
     return result;
 }
@@ -572,9 +573,8 @@ static uint32_t set_range(uint32_t range, uint32_t full_resolution)
 {
     uint32_t result = RESULT_BAD_VALUE;
     if ((range <= 3U) && (full_resolution <= 1U)) {
-        core.chip.data_format = (uint8_t)((core.chip.data_format & ADXL345_SELF_TEST) | range |
-                                          ((full_resolution != 0U) ? ADXL345_FULL_RESOLUTION : 0U));
-        reconfigure();
+        reconfigure(core.rate_hz, core.chip.bw_rate, (core.chip.data_format & ADXL345_SELF_TEST) | range |
+                    ((full_resolution != 0U) ? ADXL345_FULL_RESOLUTION : 0U));
         result = RESULT_DONE;
     }
     return result;
@@ -584,9 +584,8 @@ static uint32_t set_self_test(uint32_t on)
 {
     uint32_t result = RESULT_BAD_VALUE;
     if (on <= 1U) {
-        core.chip.data_format =
-            (uint8_t)((core.chip.data_format & ~ADXL345_SELF_TEST) | ((on != 0U) ? ADXL345_SELF_TEST : 0U));
-        reconfigure();
+        reconfigure(core.rate_hz, core.chip.bw_rate,
+                    (core.chip.data_format & ~ADXL345_SELF_TEST) | ((on != 0U) ? ADXL345_SELF_TEST : 0U));
         result = RESULT_DONE;
     }
     return result;

@@ -21,7 +21,7 @@
 
 #define FIRMWARE_MAJOR 1U
 #define FIRMWARE_MINOR 3U
-#define FIRMWARE_PATCH 0U
+#define FIRMWARE_PATCH 1U
 
 #define RATE_MIN_HZ 10U
 #define RATE_MAX_HZ 3200U
@@ -70,7 +70,7 @@ enum result {
 /* Take over the defaults, configure the sensors, announce the board. Call with interrupts off. */
 void core_init(uint32_t reset_cause, uint32_t baud);
 
-/* Begin sampling at the present rate. */
+/* Begin sampling at the present rate, anew if it is under way. For the main loop, or with interrupts off. */
 void core_start(void);
 
 /* Read all sensors and queue one frame; called by the sample timer's interrupt. */

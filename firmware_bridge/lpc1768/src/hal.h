@@ -29,8 +29,11 @@ uint32_t hal_time_us(void);
 /* Let at least this time pass. */
 void hal_wait_us(uint32_t microseconds);
 
-/* Start the sample timer at rate_hz, or stop it. */
+/* Start the sample timer at rate_hz. */
 void hal_timer_start(uint32_t rate_hz);
+
+/* Stop the sample timer. Once this has returned, core_sample() is not called before the next start: an interrupt that was
+ * due has been served or is withdrawn. For the main loop, which no sample interrupts half-way and resumes. */
 void hal_timer_stop(void);
 
 /* Let the next sample, and all after it, come later. For the sample timer's interrupt; at most the time since it. */

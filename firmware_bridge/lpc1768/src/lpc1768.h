@@ -114,6 +114,8 @@
 
 /* Cortex-M3 */
 #define NVIC_ISER0 REGISTER(0xE000E100U)
+#define NVIC_ICER0 REGISTER(0xE000E180U)
+#define NVIC_ICPR0 REGISTER(0xE000E280U)
 #define NVIC_PRIORITY(irq) REGISTER8(0xE000E400U + (irq))
 #define NVIC_PRIORITY_SHIFT 3U
 #define SYST_CSR REGISTER(0xE000E010U)
@@ -125,6 +127,12 @@
 
 #define IRQ_TIMER0 1U
 #define IRQ_UART0 5U
+
+/* What was written before holds for every instruction behind it. */
+static inline void barrier(void)
+{
+    __asm volatile("dsb\n\tisb" ::: "memory");
+}
 
 static inline void wait_for_interrupt(void)
 {

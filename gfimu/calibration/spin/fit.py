@@ -18,6 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import InputError
+from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.calibration.fit_quality import covariance_scale
 from gfimu.calibration.result import Calibration
 from gfimu.calibration.spin.model import Geometry, SpinGeometry, read_plateaus
@@ -25,10 +28,7 @@ from gfimu.calibration.spin.plateaus import Plateaus, find_plateaus
 from gfimu.calibration.spin.policy import SpinPolicy
 from gfimu.calibration.spin.prior import SensorPrior, sensor_prior
 from gfimu.calibration.spin.report import spin_statements, spin_statistics
-from gfimu.errors import InputError
-from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
-from gfimu.units import STANDARD_GRAVITY
 
 __all__ = ["spin"]
 
@@ -220,12 +220,17 @@ class _Problem:
         used = np.isfinite(runs.variance).ravel()
         measured, noise = runs.means.ravel()[used], factor * runs.variance.ravel()[used]
         values, prior = self.values if near is None else near, self.covariance
-        std = np.sqrt(np.diag(prior))
+        std, before = np.sqrt(np.diag(prior)), values
         for _ in range(_ITERATIONS):
-            predicted, slopes = self._predict(values)
-            predicted, slopes = predicted.ravel()[used], slopes.reshape(-1, len(values))[used]
-            spread = prior @ slopes.T  # (u, n)
-            total = cho_factor(slopes @ spread + np.diag(noise), lower=True)
+            try:
+                with np.errstate(all="ignore"):
+                    predicted, slopes = self._predict(values)
+                    predicted, slopes = predicted.ravel()[used], slopes.reshape(-1, len(values))[used]
+                    spread = prior @ slopes.T  # (u, n)
+                    total = cho_factor(slopes @ spread + np.diag(noise), lower=True)
+            except ValueError:  # the step led to where the equations have no solution: half of it
+                values = 0.5 * (before + values)
+                continue
             gain = cho_solve(total, spread.T).T
             before, values = values, self.values + gain @ (measured - predicted - slopes @ (self.values - values))
             if np.all(np.abs(values - before) <= _SETTLED * std):

@@ -19,9 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from gfimu.array.array import AccelerometerArray
 from gfimu.calibration.error_model import ErrorModel
 from gfimu.calibration.spin.plateaus import Plateaus
-from gfimu.geometry.array import AccelerometerArray
 
 __all__ = ["Geometry", "SpinGeometry", "read_plateaus"]
 

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import savgol_coeffs, savgol_filter
 
+from gfimu.base.errors import InputError
 from gfimu.calibration.spin.policy import SpinPolicy
-from gfimu.errors import InputError
-from gfimu.importing.guessing.likely_reference import reference_remedy
 from gfimu.recording import Recording
+from gfimu.recording.importing.guessing.likely_reference import reference_remedy
 from gfimu.recording.timing.reference_times import reference_on_rows
 
 __all__ = ["Plateaus", "find_plateaus"]

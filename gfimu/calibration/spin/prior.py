@@ -8,14 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.array.array import AccelerometerArray
+from gfimu.array.parts.limits import PartLimits
+from gfimu.base.errors import InputError, UnitError
 from gfimu.calibration.error_model import ErrorModel
 from gfimu.calibration.nonlinearity import cubic_std, quadratic_std
 from gfimu.calibration.parameter_names import cubic_names, parameter_names, quadratic_names
 from gfimu.calibration.result import Calibration
 from gfimu.calibration.spin.policy import SpinPolicy
-from gfimu.errors import InputError, UnitError
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.parts.limits import PartLimits
 from gfimu.recording import Recording
 
 __all__ = ["SensorPrior", "sensor_prior"]

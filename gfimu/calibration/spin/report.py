@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.calibration.parameter_names import kind_of
 from gfimu.calibration.result import Calibration
 from gfimu.calibration.spin.plateaus import Plateaus
 from gfimu.calibration.spin.policy import SpinPolicy
@@ -109,7 +110,7 @@ def _bucking(result: Calibration, covariance: Floats, at: Places, arms: Mapping[
         worst = max(found, key=lambda name: abs(found[name]))
         return f"{found[worst]:+.2f} ({worst})"
 
-    bends = [name for name in result.names if name.split("_")[1] == "q"]
+    bends = [name for name in result.names if kind_of(name) == "q"]
     stretch = unit(int(at["stretch"][0]))
     cubic = strongest({name: (unit(place[name]), unit(place[name.replace("_q_", "_c_")])) for name in bends})
     stretched = strongest({name: (unit(place[name]), stretch) for name in bends})

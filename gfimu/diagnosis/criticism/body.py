@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
+from gfimu.array.kinematics import omega_products
 from gfimu.diagnosis.criticism.series_tests import SLOWEST_LINE, LackOfFit
 from gfimu.diagnosis.data.body.stretch import BodyStretch
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.terms.hand.drive import HandDrive
 from gfimu.diagnosis.terms.hand.noise import BodyNoise
 from gfimu.diagnosis.terms.hand.posterior import HandPosterior
-from gfimu.geometry.kinematics import omega_products
 
 __all__ = ["body_functions", "motion_noise", "tone"]
 

@@ -25,7 +25,7 @@ from gfimu.diagnosis.fit.posterior import Posterior
 from gfimu.diagnosis.terms.cause import Cause, effects_of
 from gfimu.diagnosis.terms.library import cause_columns
 from gfimu.diagnosis.terms.spline import DEGREE
-from gfimu.world_model import Spin, SpinState
+from gfimu.model.world_model import Spin, SpinState
 
 __all__ = ["apart_from_noise", "drive_covariance", "expected_score", "expected_score_of_causes"]
 

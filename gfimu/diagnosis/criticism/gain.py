@@ -3,66 +3,53 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated
+
+from gfimu.base.declared import Declared, figure
 
 __all__ = ["Gain"]
 
+_UNKNOWN = float("nan")
+
 
 @dataclass(frozen=True)
-class Gain:
-    """What the extension is worth on validation data.
+class Gain(Declared):
+    """What the extension is worth on validation data; NaN where a number was not estimated.
 
-    Parameters
-    ----------
-    held_out : str
-        Which data, in words: another recording, or blocks of this one; empty where none could be held out.
-    rms_before, rms_after : float
-        Residual rms on them, m/s².
-    share_of_excess_removed : float
-        1 − (after² − floor²)/(before² − floor²), channels and reference together in units of their noise, each with
-        the drive that suits it best; NaN where there was no excess.
-    log_likelihood_per_sample, log_likelihood_std : float
-        Gain per sample and its standard error.
-    rate_rmse_before, rate_rmse_after : float
-        Rate of the array against the reference, rad/s.
-    drift_before, drift_after : float
-        Position drift of the held-out stretch, m.
-    share_std : float
-        Standard error of ``share_of_excess_removed`` by the noise; NaN where it was not estimated.
-    share_in_any_recording : float
-        The same share without terms of absolute time, which another recording has otherwise; NaN where nothing can
-        be said.
-    of_other_recording : bool
-        Whether the held-out data are another recording.
+    ``of_other_recording`` says whether the held-out data are another recording, and not blocks of this one. The share
+    counts channels and reference together in units of their noise, each with the drive that suits it best.
     """
 
-    held_out: str = ""
-    rms_before: float = float("nan")
-    rms_after: float = float("nan")
-    share_of_excess_removed: float = float("nan")
-    log_likelihood_per_sample: float = float("nan")
-    log_likelihood_std: float = float("nan")
-    rate_rmse_before: float = float("nan")
-    rate_rmse_after: float = float("nan")
-    drift_before: float = float("nan")
-    drift_after: float = float("nan")
-    share_std: float = float("nan")
-    share_in_any_recording: float = float("nan")
+    held_out: Annotated[str, figure("Which data these are, in words; empty where none could be held out.")] = ""
+    rms_before: Annotated[float, figure("Prediction error before, rms.", "m/s²", key="held_out_rms_before")] = _UNKNOWN
+    rms_after: Annotated[float, figure("Prediction error after, rms.", "m/s²", key="held_out_rms_after")] = _UNKNOWN
+    share_of_excess_removed: Annotated[
+        float, figure("Share of the error beyond noise that is gone: 1 − (after² − floor²)/(before² − floor²).")
+    ] = _UNKNOWN
+    log_likelihood_per_sample: Annotated[float, figure("Gain of the log likelihood per sample.", "nats")] = _UNKNOWN
+    log_likelihood_std: Annotated[float, figure("Its standard error.", "nats")] = _UNKNOWN
+    rate_rmse_before: Annotated[
+        float,
+        figure("Rate of the array against the reference, before.", "rad/s", key="rate_rmse_before_rad_s"),
+    ] = _UNKNOWN
+    rate_rmse_after: Annotated[
+        float, figure("Rate of the array against the reference, after.", "rad/s", key="rate_rmse_after_rad_s")
+    ] = _UNKNOWN
+    drift_before: Annotated[float, figure("Position drift before.", "m", key="position_drift_before_m")] = _UNKNOWN
+    drift_after: Annotated[float, figure("Position drift after.", "m", key="position_drift_after_m")] = _UNKNOWN
+    share_std: Annotated[
+        float,
+        figure(
+            "Standard deviation of that share by the noise.",
+            key="share_of_excess_removed_std",
+            before="log_likelihood_per_sample",
+        ),
+    ] = _UNKNOWN
+    share_in_any_recording: Annotated[
+        float,
+        figure(
+            "The share without terms of absolute time, which another recording has otherwise.",
+            before="log_likelihood_per_sample",
+        ),
+    ] = _UNKNOWN
     of_other_recording: bool = False
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON form of the contract."""
-        return {
-            "held_out": self.held_out,
-            "held_out_rms_before": self.rms_before,
-            "held_out_rms_after": self.rms_after,
-            "share_of_excess_removed": self.share_of_excess_removed,
-            "share_of_excess_removed_std": self.share_std,
-            "share_in_any_recording": self.share_in_any_recording,
-            "log_likelihood_per_sample": self.log_likelihood_per_sample,
-            "log_likelihood_std": self.log_likelihood_std,
-            "rate_rmse_before_rad_s": self.rate_rmse_before,
-            "rate_rmse_after_rad_s": self.rate_rmse_after,
-            "position_drift_before_m": self.drift_before,
-            "position_drift_after_m": self.drift_after,
-        }

@@ -16,8 +16,8 @@ from gfimu.diagnosis.terms.cause import effects_of
 from gfimu.diagnosis.terms.columns import Columns
 from gfimu.diagnosis.terms.drive import Drive
 from gfimu.diagnosis.terms.library import cause_columns
-from gfimu.generic_basis import Motion
-from gfimu.world_model import BasisUnits, SpinState
+from gfimu.model.generic_basis import Motion
+from gfimu.model.world_model import BasisUnits, SpinState
 
 __all__ = [
     "FEWEST_CYCLES",

@@ -26,7 +26,7 @@ from gfimu.diagnosis.terms.drive import Drive
 from gfimu.diagnosis.terms.hand.drive import HandDrive
 from gfimu.diagnosis.terms.hand.noise import BodyNoise
 from gfimu.diagnosis.terms.observed import observe
-from gfimu.world_model import Effect, is_linear, is_of_one_recording
+from gfimu.model.world_model import Effect, is_linear, is_of_one_recording
 
 __all__ = ["Measured", "gain_of", "measure"]
 

@@ -13,6 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from gfimu.array.array import AccelerometerArray
 from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.criticism.held_out_stretch import Measured, gain_of, measure
 from gfimu.diagnosis.data.body.stretch import BodyStretch
@@ -26,8 +27,7 @@ from gfimu.diagnosis.fit.parallel import each_apart, over_segments
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.terms.cause import Cause, effects_of
 from gfimu.diagnosis.terms.drive import MARGIN, Drive
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.world_model import Effect
+from gfimu.model.world_model import Effect
 
 __all__ = ["Holdout", "Part", "gate_gains", "held_out_gain", "other_recordings", "split"]
 

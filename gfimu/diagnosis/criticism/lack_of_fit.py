@@ -40,13 +40,13 @@ from gfimu.diagnosis.fit.posterior import Posterior
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.terms.cause import effects_of
 from gfimu.diagnosis.terms.drive import Drive
-from gfimu.generic_basis import FUNCTIONS
-from gfimu.world_model import BasisUnits, SpinState, memory_of
+from gfimu.model.generic_basis import FUNCTIONS
+from gfimu.model.world_model import BasisUnits, SpinState, memory_of
 
 __all__ = ["JERK", "LackOfFit", "dependence_unexplained", "lack_of_fit"]
 
 JERK = "jerk"
-"""Derivative of the angular acceleration, beside the functions of `gfimu.generic_basis`."""
+"""Derivative of the angular acceleration, beside the functions of `gfimu.model.generic_basis`."""
 _NAMES = (*FUNCTIONS, JERK)
 _LEAST_RMS, _LEAST_JERK = 1e-6, 1e-12  # numerical: of a function that is not constant
 _RIDGE = 1e-2  # numerical: of the coefficients that are reported

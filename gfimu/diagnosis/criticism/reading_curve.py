@@ -13,7 +13,7 @@ from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.gauss_newton import Fit, fit
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.terms.cause import Cause
-from gfimu.generic_basis import OF_READING
+from gfimu.model.generic_basis import OF_READING
 
 __all__ = ["reading_curve"]
 

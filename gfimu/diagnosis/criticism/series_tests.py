@@ -14,10 +14,10 @@ from gfimu.diagnosis.criticism.generic import REFERENCE, judges_reference
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.terms.observed import Observed
-from gfimu.generic_basis import step_at
-from gfimu.world_model import SpinState
+from gfimu.model.generic_basis import step_at
+from gfimu.model.world_model import SpinState
 
-__all__ = ["SLOWEST_LINE", "LackOfFit", "changing_noise", "jumps", "lines"]
+__all__ = ["NOTHING", "SLOWEST_LINE", "LackOfFit", "changing_noise", "jumps", "lines"]
 
 SLOWEST_LINE = 1.0  # numerical: Hz; below it slow noise and the drive are free
 _LEAST_LINE_LEVEL = 0.7  # numerical: white noise in its own units has a level of 1
@@ -44,7 +44,7 @@ class LackOfFit:
     instead : bool
         Whether it takes the place of named causes, which then are a compromise, instead of adding to them.
     hints : tuple of str
-        Functions (`gfimu.generic_basis`) beyond the usual ones that may describe it.
+        Functions (`gfimu.model.generic_basis`) beyond the usual ones that may describe it.
     dependence : str
         The function that it follows, where it follows one.
     noise_odds : float
@@ -60,7 +60,8 @@ class LackOfFit:
     noise_odds: float = -np.inf
 
 
-_NOTHING = LackOfFit(-np.inf, "", {})
+NOTHING = LackOfFit(-np.inf, "", {})
+"""What a test that shows nothing returns."""
 
 
 def lines(stretch: Stretch, seen: Observed) -> LackOfFit:
@@ -114,7 +115,7 @@ def jumps(stretch: Stretch, seen: Observed) -> LackOfFit:
     mask = stretch.mask[:, :-1]
     residual = (seen.residual / seen.levels.white)[:, :-1] * mask
     period, duration = stretch.run.sample_period, stretch.run.duration
-    best = _NOTHING
+    best = NOTHING
     for width in _WIDTHS:
         size = round(width / period)
         if size < _FEWEST_IN_MEAN or duration < _FEWEST_WIDTHS * width:
@@ -164,7 +165,7 @@ def changing_noise(
     policy : Policy
         Threshold ``sizeable``.
     """
-    best = _NOTHING
+    best = NOTHING
     for stretch, mine, state in zip(stretches, seen, states, strict=True):
         left = np.diff((mine.residual / mine.levels.white)[:, :-1], n=2, axis=0) / np.sqrt(6.0)
         mask = stretch.mask[:, :-1]

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.diagnosis.criticism.generic import (
     FEWEST_CYCLES,
     LEAST_INFORMATION,
@@ -32,9 +33,8 @@ from gfimu.diagnosis.fit.observed_at import observed_at
 from gfimu.diagnosis.fit.posterior import Posterior
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.terms.cause import Cause
-from gfimu.generic_basis import FUNCTIONS, OF_READING, basis_function, is_of_time, ripples, tone
-from gfimu.units import STANDARD_GRAVITY
-from gfimu.world_model import BasisUnits
+from gfimu.model.generic_basis import FUNCTIONS, OF_READING, basis_function, is_of_time, ripples, tone
+from gfimu.model.world_model import BasisUnits
 
 __all__ = ["Surrogate", "surrogates"]
 
@@ -96,7 +96,7 @@ def surrogates(
     policy : Policy
         Thresholds of fits, and ``beam``, ``extra_odds``, ``small``, ``dominant`` and ``most_searched``.
     hints : sequence of str
-        Functions of `gfimu.generic_basis` to look at besides its own.
+        Functions of `gfimu.model.generic_basis` to look at besides its own.
     """
     point = _without_walk(stretches, nothing.point)
     units = basis_units(stretches, point)
@@ -150,11 +150,14 @@ def _ever_richer(
         terms = [*kept, *more]
         causes = (*kept.values(), *(term.cause(stretches[0], units) for term in more))
         point = replace(present.point, causes=causes)
-        richer = fit(stretches, point, replace(policy, steps=FEW))
         unexplained = max(present.objective - observations, 0.0)
-        if not present.objective - richer.objective > policy.dominant * unexplained:
+        try:
+            richer = fit(stretches, point, replace(policy, steps=FEW))
+            if not present.objective - richer.objective > policy.dominant * unexplained:
+                break
+            present = _settled(stretches, richer.point, policy)
+        except np.linalg.LinAlgError:  # functions that can't be solved for describe nothing
             break
-        present = _settled(stretches, richer.point, policy)
         found.append(Surrogate(present))
     return found
 

@@ -18,8 +18,14 @@ from gfimu.diagnosis.data.faults.wiring import Fault, find_wiring, range_factors
 from gfimu.diagnosis.data.reference import difference_noise
 from gfimu.diagnosis.data.rounding import common_step
 from gfimu.diagnosis.data.run import Run
-from gfimu.diagnosis.data.samples import channel_spikes, frozen_fault, frozen_stretches
-from gfimu.world_model import Effect, ExpectedNoise, WorldModel
+from gfimu.diagnosis.data.samples import (
+    channel_spikes,
+    frozen_fault,
+    frozen_stretches,
+    is_at_extreme,
+    is_frozen,
+)
+from gfimu.model.world_model import Effect, ExpectedNoise, WorldModel
 
 __all__ = ["IntegrityReport", "check_integrity"]
 
@@ -64,17 +70,22 @@ def check_integrity(model: WorldModel, run: Run, prediction: NDArray[np.float64]
     known, library = {effect.name for effect in model.effects}, model.families()
     step, expected = _resolution(run), model.expected_noise(run.output_data_rate)
     counts = _Counts(max(step or 0.0, expected.quantum), range_factors(model.effects, model), expected)
+    stopped = _stopped(run, prediction, counts)  # wherever the motion is wrong, too
+    run = replace(run, valid=_without(run.valid, stopped))
     wiring = find_wiring(model, _alive(model, run, prediction, counts), prediction, expected.white, known)
     wired = [library[name](parameters) for name, parameters, _ in wiring if name in library]
     prediction = rewired(prediction, wired, model)
     counts = replace(counts, coarser=range_factors([*model.effects, *wired], model))
+    stopped += _stopped(run, prediction, counts, rewired=True)
+    run = replace(run, valid=_without(run.valid, stopped))
     ends = _ends(model, run, prediction, counts)
     clipped = _clipped(run, prediction, ends, counts)
     faults = [*_lost(run), *_coarse(step, expected.quantum), *wiring]
     faults += _saturation(run, clipped, ends, counts, model.array.channels)
     run = replace(run, valid=run.valid & ~clipped)
-    limit = None if ends.rails else ends.limit
-    frozen = frozen_stretches(run, prediction, counts.quantum, limit, expected.analogue)
+    whole = replace(run, valid=run.valid | clipped)
+    held = _held(run, prediction, counts)
+    frozen = stopped + [one for one in held if not is_at_extreme(whole, one, *counts.of(one[0]))]
     run = replace(run, valid=_without(run.valid, frozen))
     if frozen:
         faults.append(("stuck_channel", *frozen_fault(run, frozen, model.array.channels)))
@@ -97,6 +108,10 @@ class _Counts:
     def steps(self) -> NDArray[np.float64]:
         """One count of each channel, m/s²."""
         return self.quantum * self.coarser
+
+    def of(self, channel: int) -> tuple[float, float]:
+        """Return the step and the white noise of a channel, m/s²."""
+        return float(self.steps[channel]), float(self.white[channel])
 
     @property
     def white(self) -> NDArray[np.float64]:
@@ -148,8 +163,22 @@ def _alive(model: WorldModel, run: Run, prediction: NDArray[np.float64], counts:
     limit = np.inf if ends.limit is None or ends.rails else ends.limit - 0.6 * counts.quantum
     at_limit = np.abs(run.readings) >= limit
     at_limit |= on_rails(run, np.zeros_like(prediction), ends.rails, counts.steps, np.zeros_like(counts.coarser))
-    frozen = frozen_stretches(run, prediction, counts.quantum, ends.limit, counts.expected.analogue)
+    frozen = _held(run, prediction, counts)
     return replace(run, valid=_without(run.valid & ~at_limit, frozen))
+
+
+def _held(run: Run, prediction: NDArray[np.float64], counts: _Counts) -> list[tuple[int, int, int]]:
+    """Return (channel, start, stop) of stretches in which a channel holds one value, frozen or on a rail."""
+    return frozen_stretches(run, prediction, counts.quantum, counts.expected.analogue)
+
+
+def _stopped(
+    run: Run, prediction: NDArray[np.float64], counts: _Counts, *, rewired: bool = False
+) -> list[tuple[int, int, int]]:
+    """Return those that are on no rail, by the readings alone or, ``rewired``, by their prediction too."""
+    beyond = prediction if rewired else None
+    held = _held(run, prediction, counts)
+    return [one for one in held if is_frozen(run, one, *counts.of(one[0]), beyond)]
 
 
 def _without(valid: NDArray[np.bool_], frozen: Sequence[tuple[int, int, int]]) -> NDArray[np.bool_]:

@@ -9,14 +9,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.diagnosis.data.conversions import settled
+from gfimu.base.errors import InputError, RecordingWarning
 from gfimu.diagnosis.data.integrity import IntegrityReport, check_integrity
 from gfimu.diagnosis.data.plausibility import refuse_implausible
 from gfimu.diagnosis.data.run import Run, prepare_run, smooth_rate
 from gfimu.diagnosis.data.samples import reference_spikes
-from gfimu.errors import InputError, RecordingWarning
+from gfimu.diagnosis.data.table.settling import settled
+from gfimu.model.world_model import Effect, WorldModel, reads_place
 from gfimu.recording import Recording
-from gfimu.world_model import Effect, WorldModel, reads_place
 
 __all__ = ["PreparedRuns"]
 

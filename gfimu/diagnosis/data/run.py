@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
+from gfimu.base.errors import InputError
 from gfimu.diagnosis.data.conversions import Conversions
 from gfimu.diagnosis.data.reference import (
     BRIDGED_GAP,
@@ -19,10 +20,9 @@ from gfimu.diagnosis.data.reference import (
 )
 from gfimu.diagnosis.data.rounding import between_steps
 from gfimu.diagnosis.data.time_grid import time_grid
-from gfimu.errors import InputError
+from gfimu.model.world_model import WorldModel
 from gfimu.recording import Recording
 from gfimu.recording.timing.conversion_times import output_data_rate
-from gfimu.world_model import WorldModel
 
 __all__ = [
     "MINIMUM_SAMPLES",

@@ -12,18 +12,28 @@ from scipy.special import ndtr
 from gfimu.diagnosis.data.reference import difference_noise
 from gfimu.diagnosis.data.run import Run
 from gfimu.diagnosis.policy import Policy
+from gfimu.recording.importing.oddities import BEYOND_PILE, LONGEST_EQUAL, is_within_range
 
-__all__ = ["channel_spikes", "frozen_fault", "frozen_stretches", "reference_spikes"]
+__all__ = [
+    "channel_spikes",
+    "frozen_fault",
+    "frozen_stretches",
+    "is_at_extreme",
+    "is_frozen",
+    "reference_spikes",
+]
 
-_LONGEST_EQUAL = 40
 _LEAST_NOISE = 0.1  # of a step: with less no run is long enough to show it
 _SPIKE = 8.0  # noise
+_MOVES = 10.0  # noise, or counts: range of a channel that moves
+_INWARDS = 0.25  # of the range of a channel: more than a wrong gain turns a prediction away from a rail
+_TURNED = 6.0  # noise, or counts, at least
 _ROUGH = 6.0  # how much neighbours usually differ there
 _NEIGHBOURS, _AROUND = 5, 9
 
 
 def frozen_stretches(
-    run: Run, prediction: NDArray[np.float64], quantum: float, limit: float | None, noise: NDArray[np.float64]
+    run: Run, prediction: NDArray[np.float64], quantum: float, noise: NDArray[np.float64]
 ) -> list[tuple[int, int, int]]:
     """Return (channel, start, stop) of stretches in which a channel holds one value though it should not.
 
@@ -35,8 +45,6 @@ def frozen_stretches(
         What the simulation predicts for it, m/s².
     quantum : float
         Step of the readings, m/s².
-    limit : float, optional
-        Where readings are clipped, m/s².
     noise : ndarray, shape (c,)
         White noise before rounding, m/s².
     """
@@ -46,18 +54,17 @@ def frozen_stretches(
         edges.append(np.concatenate([[-1], change, [len(mine) - 1]]))
         lengths = np.diff(edges[-1])
         # How much the channel usually changes: away from the stretches in question.
-        alive = np.repeat(lengths <= _LONGEST_EQUAL, lengths) & valid
+        alive = np.repeat(lengths <= LONGEST_EQUAL, lengths) & valid
         usual.append(float(np.median(np.abs(np.diff(mine[alive])))) if alive.sum() > 10 else np.nan)
     # A channel that was dead all through would have changed like the quietest of the others.
     quietest = 0.0 if np.isnan(usual).all() else float(np.nanmin(usual))
     for channel in range(run.readings.shape[1]):
         mine = run.readings[:, channel]
         changes = quietest if np.isnan(usual[channel]) else usual[channel]
-        for place in np.flatnonzero(np.diff(edges[channel]) > _LONGEST_EQUAL):
+        for place in np.flatnonzero(np.diff(edges[channel]) > LONGEST_EQUAL):
             start, stop = int(edges[channel][place]) + 1, int(edges[channel][place + 1]) + 1
-            at_limit = limit is not None and abs(mine[start]) >= limit - 0.6 * quantum
             moving = float(np.ptp(prediction[start:stop, channel])) > 2.5 * quantum
-            if at_limit or not run.valid[start:stop, channel].any():
+            if not run.valid[start:stop, channel].any():
                 continue
             spread = _spread_of_others(run, channel, start, stop, quantum)
             if np.isnan(spread):
@@ -67,6 +74,33 @@ def frozen_stretches(
             if moving or (changes > 0.3 * quantum and stop - start > least):
                 found.append((channel, start, stop))
     return found
+
+
+def is_frozen(
+    run: Run, stretch: tuple[int, int, int], step: float, noise: float, prediction: NDArray[np.float64] | None = None
+) -> bool:
+    """Return whether the value that a channel holds in a (channel, start, stop) can be no end of its range.
+
+    ``step`` is one count, ``noise`` the white noise, m/s². A prediction (n, c) that turns away from the level for most
+    of the time shows it, too.
+    """
+    channel, start, stop = stretch
+    mine = np.where(run.valid[:, channel], run.readings[:, channel], np.nan)
+    if is_within_range(mine, start, stop, step, noise):
+        return True
+    if prediction is None:
+        return False
+    away = mine - mine[start]
+    turned = np.sign(np.nansum(np.sign(away))) * (prediction[start:stop, channel] - mine[start])
+    return bool(np.median(turned) > max(_INWARDS * (np.nanmax(away) - np.nanmin(away)), _TURNED * max(noise, step)))
+
+
+def is_at_extreme(run: Run, stretch: tuple[int, int, int], step: float, noise: float) -> bool:
+    """Return whether a channel that moves hardly reads beyond the value that it holds in a (channel, start, stop)."""
+    channel, start, stop = stretch
+    away = run.readings[run.valid[:, channel], channel] - run.readings[start, channel]
+    beyond = min(np.sum(away > 0.5 * step), np.sum(away < -0.5 * step))
+    return bool(np.ptp(away) > _MOVES * max(noise, step) and beyond <= BEYOND_PILE * (stop - start))
 
 
 def _spread_of_others(run: Run, channel: int, start: int, stop: int, quantum: float) -> float:
@@ -89,7 +123,7 @@ def _spread_of_others(run: Run, channel: int, start: int, stop: int, quantum: fl
 def _least_equal(spread: float, quantum: float, readings: int) -> float:
     """Return how many equal readings in a row noise of a ``spread`` leaves to chance in a run of so many readings."""
     same = np.log(2.0 * ndtr(0.5 * quantum / max(spread, _LEAST_NOISE * quantum)) - 1.0)  # of one reading more
-    return max(float((np.log(Policy.chance) - np.log(readings)) / same), _LONGEST_EQUAL)
+    return max(float((np.log(Policy.chance) - np.log(readings)) / same), LONGEST_EQUAL)
 
 
 def frozen_fault(
@@ -98,7 +132,7 @@ def frozen_fault(
     """Return the longest frozen stretch, with every channel that was frozen with it, and a sentence about all."""
     _, start, stop = max(frozen, key=lambda one: one[2] - one[1])
     # A value that happens to be read again lengthens a channel's stretch.
-    together = [one for one in frozen if max(abs(one[1] - start), abs(one[2] - stop)) < _LONGEST_EQUAL]
+    together = [one for one in frozen if max(abs(one[1] - start), abs(one[2] - stop)) < LONGEST_EQUAL]
     channels = [names[channel] for channel, _, _ in together]
 
     def span(first: int, end: int) -> str:

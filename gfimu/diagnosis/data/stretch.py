@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -11,15 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
+from gfimu.base.errors import GfimuError
 from gfimu.diagnosis.data.cosine_basis import CosineBasis, NoiseLevels
 from gfimu.diagnosis.data.reference import difference_noise
 from gfimu.diagnosis.data.rounding import COARSE, NO_STEPS, Steps
 from gfimu.diagnosis.data.run import Run, smooth_rate
 from gfimu.diagnosis.data.table.spins import JoinedSpin, ScaledSpin, State
 from gfimu.diagnosis.data.table.start_angle import gravity_angle
-from gfimu.world_model import Effect, Spin, WorldModel, is_linear, is_of_wiring, reads_place
+from gfimu.diagnosis.time_limit import check_time
+from gfimu.model.world_model import Effect, Spin, WorldModel, is_linear, is_of_wiring, reads_place
 
-__all__ = ["RunUp", "Stretch", "make_stretches", "moved"]
+__all__ = ["NoPredictionError", "RunUp", "Stretch", "finite_prediction", "make_stretches", "moved"]
 
 _DURATION = 64.0  # s, about: one drive's normal equations grow with its square
 _LOST_ANGLE_STD = 3.0  # rad: the table's angle after a gap of the reference
@@ -27,6 +29,33 @@ _LEAST_GAIN = 0.05  # of the reference
 _FINEST_ANGLE = 2e-5  # rad
 _FINEST_RATE = 1e-4  # rad/s, and of the spread of the rate
 _REST_FACTOR = 1.3
+
+
+class NoPredictionError(np.linalg.LinAlgError):
+    """A simulation that has no finite answer, as at a trial point of a fit that is too far away."""
+
+
+def finite_prediction(predict: Callable[[], NDArray[np.float64]]) -> NDArray[np.float64]:
+    """Return what a simulation predicts.
+
+    Raises
+    ------
+    NoPredictionError
+        If its answer is not finite, or it has none.
+    KeyboardInterrupt
+        If the time of the diagnosis is over.
+    """
+    check_time()
+    try:
+        with np.errstate(all="ignore"):
+            predicted = predict()
+    except GfimuError:
+        raise
+    except (ArithmeticError, ValueError) as error:  # of splines, filters, equations, and simulations of one's own
+        raise NoPredictionError(f"the simulation has no answer: {error}") from error
+    if not np.isfinite(predicted).all():
+        raise NoPredictionError("the simulation's answer is not finite")
+    return predicted
 
 
 @dataclass(frozen=True)
@@ -149,7 +178,17 @@ class Stretch:
         return self.reference_spread < _REST_FACTOR * noise
 
     def predict(self, effects: Sequence[Effect], drive: Spin) -> NDArray[np.float64]:
-        """Predict channels and reference, shape (n, c + 1), for a drive and effects besides the known ones."""
+        """Predict channels and reference, shape (n, c + 1), for a drive and effects besides the known ones.
+
+        Raises
+        ------
+        NoPredictionError
+            If the simulation has no finite answer there.
+        """
+        return finite_prediction(lambda: self._corrected(effects, drive))
+
+    def _corrected(self, effects: Sequence[Effect], drive: Spin) -> NDArray[np.float64]:
+        """Predict channels and reference, each moved to the time at which it was read."""
         predicted = self._at_samples(effects, drive)
         period = self.run.sample_period
         if self.run.late is not None:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
-from gfimu.errors import InputError
-from gfimu.world_model import Effect, WorldModel
+import msgspec
+
+from gfimu.base.errors import InputError
+from gfimu.base.units import is_usable
+from gfimu.model.world_model import Effect, WorldModel
 
 __all__ = ["open_effects"]
 
@@ -35,18 +35,18 @@ def open_effects(path: str | Path, model: WorldModel) -> list[str | Effect]:
     if file.is_dir():
         file = file / "verdict.json"
     try:
-        verdict = json.loads(file.read_text(encoding="utf-8"))
-        causes = {str(cause["effect"]): cause for cause in verdict["causes"]}
-        rivals = [str(rival) for cause in causes.values() for rival in cause.get("not_distinguishable_from", [])]
+        verdict = msgspec.json.decode(file.read_bytes(), type=_Verdict)
     except OSError as error:
         raise InputError(f"{file}: {error.strerror}; name a verdict.json or the folder that diagnose wrote") from None
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+    except (ValueError, RecursionError):
         raise InputError(f"{file}: not a verdict; name the verdict.json that diagnose wrote") from None
-    named = [name for name, cause in causes.items() if cause.get("not_distinguishable_from")]
+    causes = {cause.effect: cause for cause in verdict.causes}
+    named = [name for name, cause in causes.items() if cause.not_distinguishable_from]
+    rivals = [rival for cause in causes.values() for rival in cause.not_distinguishable_from]
     names = list(dict.fromkeys([*named, *rivals]))
     if len(names) < 2:
         raise InputError(
-            f"{file}: the verdict is {verdict.get('verdict')!r} and leaves no effects to distinguish; "
+            f"{file}: the verdict is {verdict.verdict!r} and leaves no effects to distinguish; "
             "name them instead, such as tacho_scale sensor_position"
         )
     families = model.families()
@@ -54,14 +54,31 @@ def open_effects(path: str | Path, model: WorldModel) -> list[str | Effect]:
     fewest = min(sizes.values(), default=0)
     effects: list[str | Effect] = []
     for name in names:
-        fitted = _fitted(causes.get(name, {}), name, model) if sizes.get(name) == fewest else None
+        fitted = _fitted(causes[name], model) if name in causes and sizes.get(name) == fewest else None
         effects.append(name if fitted is None else fitted)
     return effects
 
 
-def _fitted(cause: Mapping[str, Any], name: str, model: WorldModel) -> Effect | None:
+class _Value(msgspec.Struct):
+    value: float | str | list[str] | None
+
+
+class _Cause(msgspec.Struct):
+    effect: str
+    parameters: dict[str, _Value] = {}
+    not_distinguishable_from: list[str] = []
+
+
+class _Verdict(msgspec.Struct):
+    """What is read of a verdict's file."""
+
+    causes: list[_Cause]
+    verdict: str = ""
+
+
+def _fitted(cause: _Cause, model: WorldModel) -> Effect | None:
     """Return the effect as fitted, or None where the verdict does not hold its size."""
-    values = {key: entry.get("value") for key, entry in cause.get("parameters", {}).items()}
-    numbers = {key: float(value) for key, value in values.items() if isinstance(value, int | float)}
-    effect = model.families()[name](numbers)
+    values = {key: one.value for key, one in cause.parameters.items()}
+    numbers = {key: value for key, value in values.items() if isinstance(value, float) and is_usable(value)}
+    effect = model.families()[cause.effect](numbers)
     return effect if effect.size_values(model.array).any() else None

@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.base.errors import InputError
 from gfimu.diagnosis.data.run import MINIMUM_DURATION, Run
 from gfimu.diagnosis.design.distinguishability import (
     Distinguishability,
@@ -24,8 +25,7 @@ from gfimu.diagnosis.design.planned_run import planned, recorded_stretches
 from gfimu.diagnosis.design.profile_search import Limits, improve, plain_profile, profile_of, starting_points
 from gfimu.diagnosis.design.proposal import SEPARATED, Proposal, in_words, scenario_of
 from gfimu.diagnosis.design.table_profile import TableProfile
-from gfimu.errors import InputError
-from gfimu.world_model import Effect, WorldModel, is_linear
+from gfimu.model.world_model import Effect, WorldModel, is_linear
 
 __all__ = ["MOUNTINGS", "Limits", "Proposal", "design"]
 
@@ -67,7 +67,7 @@ def design(
     limits : Limits
         Largest rate and acceleration of the table, and length of the recording.
     rng : numpy.random.Generator
-        Source of chance of the search.
+        Random number generator of the search.
     mountings : mapping of str to tuple
         How else the array may be mounted, by words; empty: upright only.
     recorded : sequence of Run
@@ -140,9 +140,9 @@ def design(
     text = in_words(before, after, words, inseparable, recorded=bool(recorded), limits=allowed, asked=limits)
     return Proposal(
         bench.names,
-        profile,
         (x, y, z),
         bool(words) and not recorded,
+        profile,
         before,
         after,
         allowed,

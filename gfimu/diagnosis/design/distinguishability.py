@@ -21,6 +21,8 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag
 from scipy.optimize import lsq_linear
 
+from gfimu.base.errors import InputError, unknown_name
+from gfimu.base.short_repr import short_repr
 from gfimu.diagnosis.data.run import Run
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.design.planned_run import PlannedRun, planned, recorded_stretches
@@ -30,9 +32,7 @@ from gfimu.diagnosis.fit.posterior import Posterior
 from gfimu.diagnosis.search.screening import Signature, columns_of_run
 from gfimu.diagnosis.terms.columns import Columns
 from gfimu.diagnosis.terms.library import family_columns
-from gfimu.errors import InputError, unknown_name
-from gfimu.short_repr import short_repr
-from gfimu.world_model import Effect, EffectFamily, WorldModel
+from gfimu.model.world_model import Effect, EffectFamily, WorldModel
 
 __all__ = [
     "Contender",

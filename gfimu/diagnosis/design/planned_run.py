@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.diagnosis.data.cosine_basis import NoiseLevels
 from gfimu.diagnosis.data.run import Run
 from gfimu.diagnosis.data.stretch import Stretch, make_stretches
@@ -15,8 +16,7 @@ from gfimu.diagnosis.fit.learn import starting_point
 from gfimu.diagnosis.fit.linear import Point
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.terms.drive import Drive
-from gfimu.units import STANDARD_GRAVITY
-from gfimu.world_model import Spin, WorldModel
+from gfimu.model.world_model import Spin, WorldModel
 
 __all__ = ["PlannedRun", "planned", "recorded_stretches"]
 

@@ -10,9 +10,9 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.array.smooth_ramp import PEAK_OF_RAMP
+from gfimu.base.errors import InputError
 from gfimu.diagnosis.design.table_profile import Leg, TableProfile
-from gfimu.errors import InputError
-from gfimu.geometry.smooth_ramp import PEAK_OF_RAMP
 
 __all__ = ["Limits", "improve", "plain_profile", "profile_of", "starting_points"]
 
@@ -193,7 +193,7 @@ def improve(
     limits : Limits
         Limits.
     rng : numpy.random.Generator
-        Source of chance.
+        Random number generator.
     evaluations : int
         How many profiles to try.
     report : callable

@@ -3,53 +3,54 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import tomli_w
 from numpy.typing import NDArray
 
+from gfimu.base.declared import Declared, Table, figure, table
+from gfimu.base.results import Panel, PlottedResult, Series, text_column
+from gfimu.base.short_repr import short_repr
 from gfimu.diagnosis.design.distinguishability import Distinguishability, PlannedRun
 from gfimu.diagnosis.design.profile_search import Limits
 from gfimu.diagnosis.design.table_profile import TableProfile
-from gfimu.results import Panel, PlottedResult, Series, text_column
-from gfimu.short_repr import short_repr
-from gfimu.world_model import WorldModel
+from gfimu.model.world_model import WorldModel
 
-__all__ = ["SEPARATED", "Proposal", "in_words", "scenario_of"]
+__all__ = ["SEPARATED", "Pair", "Proposal", "in_words", "scenario_of"]
 
 SEPARATED = 12.0
 """D_ij from which on two effects are distinguished with confidence, nats: odds of 10⁵, less what the prior costs."""
 
-_FIGURES = ("nats_before", "nats_after", "unexplained_before", "unexplained_after")
+
+@dataclass(frozen=True)
+class Pair(Declared):
+    """Margin of an effect over a rival."""
+
+    effect: Annotated[str, figure("The effect.", head="effect")]
+    rival: Annotated[str, figure("The rival.", head="rival")]
+    nats_before: Annotated[
+        float,
+        figure("Margin with what was recorded so far, or a plain run.", "nats", head="before, nats", form=".3g"),
+    ]
+    nats_after: Annotated[
+        float, figure("Margin with this experiment.", "nats", head="with this experiment, nats", form=".3g")
+    ]
+    unexplained_before: Annotated[float, figure("Share of the effect that the rival does not explain, before.")]
+    unexplained_after: Annotated[
+        float, figure("Share of the effect that the rival does not explain, with this experiment.")
+    ]
 
 
 @dataclass(frozen=True)
-class Proposal(PlottedResult):
+class Proposal(Declared, PlottedResult):
     """A proposed experiment: the profile or mounting that best separates effects.
 
-    Parameters
-    ----------
-    effects : tuple of str
-        The effects to distinguish.
-    profile : TableProfile
-        Motion of the table.
-    mounting : tuple of float
-        Rotation vector by which the array is turned from upright, rad.
-    upright_too : bool
-        Whether the same profile has to be recorded upright as well, and both recordings diagnosed together.
-    before : Distinguishability
-        Of the recordings at hand; where there are none, of a plain run up to speed and back in the same time.
-    after : Distinguishability
-        Of everything together once the proposal is recorded.
-    limits : Limits
-        What the table may do.
-    text : str
-        The proposal in words.
-    scenario : mapping
-        Scenario file of the proposed recording.
+    ``before`` holds how well the recordings at hand separate them, or where there are none a plain run up to speed and
+    back in the same time; ``after`` everything together once the proposal is recorded. ``limits`` are what the table
+    may do, and ``scenario`` is the scenario file of the proposed recording.
 
     Examples
     --------
@@ -57,22 +58,67 @@ class Proposal(PlottedResult):
     >>> gfimu.design("cube12_turntable", ["tacho_scale", "scale_factor"]).to_toml()  # doctest: +SKIP
     """
 
-    effects: tuple[str, ...]
-    profile: TableProfile
-    mounting: tuple[float, float, float]
-    upright_too: bool
+    effects: Annotated[tuple[str, ...], figure("The effects to distinguish.")]
+    mounting: Annotated[
+        tuple[float, float, float],
+        figure("How the array is to be turned from upright.", "rad", key="mounting_rotvec_rad"),
+    ]
+    upright_too: Annotated[
+        bool,
+        figure("Whether the same profile has to be recorded upright as well, and both recordings diagnosed together."),
+    ]
+    profile: Annotated[TableProfile, figure("Motion of the table.", flat=True)]
     before: Distinguishability
     after: Distinguishability
     limits: Limits
-    text: str
+    text: Annotated[str, figure("The proposal in words.")]
     scenario: Mapping[str, Any]
 
     __repr__ = short_repr
 
     @property
-    def separates(self) -> bool:
+    def separates(
+        self,
+    ) -> Annotated[
+        bool, figure("Whether every effect is expected to be separated from every other.", before="mounting")
+    ]:
         """Whether every effect is expected to be separated from every other."""
         return self.after.least_nats >= SEPARATED
+
+    @property
+    def nats_needed(
+        self,
+    ) -> Annotated[float, figure("Margin that separates two effects.", "nats", before="mounting")]:
+        """Margin that separates two effects, nats."""
+        return SEPARATED
+
+    @property
+    def detectability_before(
+        self,
+    ) -> Annotated[
+        NDArray[np.float64],
+        figure("d′ of each effect with what was recorded so far, or a plain run.", before="text"),
+    ]:
+        """d′ of each effect before (e,)."""
+        return self.before.detectability
+
+    @property
+    def detectability_after(
+        self,
+    ) -> Annotated[NDArray[np.float64], figure("d′ of each effect with this experiment.", before="text")]:
+        """d′ of each effect with this experiment (e,)."""
+        return self.after.detectability
+
+    @property
+    def pairs(self) -> Annotated[list[Pair], figure("Margins of each effect over each rival.", before="text")]:
+        """Margins of each effect over each rival."""
+        parts = (self.before.nats, self.after.nats, self.before.unexplained, self.after.unexplained)
+        return [
+            Pair(one, other, *(float(part[i, j]) for part in parts))
+            for i, one in enumerate(self.effects)
+            for j, other in enumerate(self.effects)
+            if i != j
+        ]
 
     def to_toml(self) -> str:
         """Return the scenario file, which ``gfimu simulate`` accepts."""
@@ -80,11 +126,26 @@ class Proposal(PlottedResult):
 
     def to_columns(self) -> dict[str, NDArray[Any]]:
         """Return one row per effect and rival: nats and unexplained share, before and after the experiment."""
-        pairs = self._pairs()
-        columns: dict[str, NDArray[Any]] = {
-            key: text_column(pair[key] for pair in pairs) for key in ("effect", "rival")
+        pairs = self.pairs
+        rows = [one.row() for one in pairs]
+        return {
+            "effect": text_column(one.effect for one in pairs),
+            "rival": text_column(one.rival for one in pairs),
+            **{name: np.concatenate([row[name] for row in rows]) for name in rows[0]},
         }
-        return columns | {key: np.array([pair[key] for pair in pairs]) for key in _FIGURES}
+
+    def shown(self) -> Iterator[Table | str]:
+        """Yield the tables and sentences that people read."""
+        yield table(
+            "Margin of each effect over each rival",
+            self.pairs,
+            "effect rival nats_before nats_after",
+            note="Expected log likelihood by which the effect, at its size, beats the best fit of the rival. Before: "
+            "with what was recorded so far, or a plain run.",
+        )
+        pieces = enumerate(self.profile.in_words(), start=1)
+        yield Table("Profile", ["piece"], [[f"{number}. {piece}"] for number, piece in pieces])
+        yield self.text
 
     def _heading(self) -> str:
         return f"Experiment to separate {', '.join(self.effects)}"
@@ -112,39 +173,6 @@ class Proposal(PlottedResult):
         )
         needed = Series("needed", np.full(len(names), SEPARATED), role="noise")
         return [profile, Panel("margin over each rival", "nats", (*margins, needed), names, scale="log")]
-
-    def _pairs(self) -> list[dict[str, Any]]:
-        return [
-            {
-                "effect": one,
-                "rival": other,
-                "nats_before": float(self.before.nats[i, j]),
-                "nats_after": float(self.after.nats[i, j]),
-                "unexplained_before": float(self.before.unexplained[i, j]),
-                "unexplained_after": float(self.after.unexplained[i, j]),
-            }
-            for i, one in enumerate(self.effects)
-            for j, other in enumerate(self.effects)
-            if i != j
-        ]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON form."""
-        return {
-            "effects": list(self.effects),
-            "separates": self.separates,
-            "nats_needed": SEPARATED,
-            "mounting_rotvec_rad": list(self.mounting),
-            "upright_too": self.upright_too,
-            "duration_s": self.profile.duration,
-            "peak_rate_rad_s": self.profile.peak_rate,
-            "peak_acceleration_rad_s2": self.profile.peak_acceleration,
-            "segments": self.profile.to_segments(),
-            "detectability_before": self.before.detectability.tolist(),
-            "detectability_after": self.after.detectability.tolist(),
-            "pairs": self._pairs(),
-            "text": self.text,
-        }
 
 
 def in_words(
@@ -206,5 +234,5 @@ def scenario_of(
         "mounting_rotvec_rad": list(mounting),
         "sensor": {**twin.get("sensor", {}), "errors": False},
         "reference": {"tacho_noise_std_rad_s": PlannedRun.reference_noise},
-        "motion": {"kind": "profile", "segment": profile.to_segments()},
+        "motion": {"kind": "profile", "segment": [one.to_dict() for one in profile.segments]},
     }

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
+from gfimu.base.declared import Declared, Table, figure, table
+from gfimu.base.errors import InputError
+from gfimu.base.results import Panel, PlottedResult, Series, text_column
 from gfimu.diagnosis.data.run import Run, prepare_run
 from gfimu.diagnosis.design.distinguishability import (
     Distinguishability,
@@ -21,14 +24,12 @@ from gfimu.diagnosis.design.distinguishability import (
 from gfimu.diagnosis.design.planned_run import recorded_stretches
 from gfimu.diagnosis.design.proposal import SEPARATED
 from gfimu.diagnosis.policy import Policy
-from gfimu.errors import InputError
-from gfimu.importing.oddities import oddities
+from gfimu.model.world_model import WorldModel, is_linear, reads_place
 from gfimu.recording import Recording
 from gfimu.recording.checks import check_recording
-from gfimu.results import Panel, PlottedResult, Series, text_column
-from gfimu.world_model import WorldModel, is_linear, reads_place
+from gfimu.recording.importing.oddities import oddities
 
-__all__ = ["EffectView", "RunCheck", "UsefulRun", "check_runs", "turns_one_way"]
+__all__ = ["CheckedRun", "EffectView", "RunCheck", "UsefulRun", "check_runs", "turns_one_way"]
 
 
 @dataclass(frozen=True)
@@ -57,46 +58,91 @@ class UsefulRun:
 
 
 @dataclass(frozen=True)
-class EffectView:
-    """How well the motion shows an effect of usual size.
+class CheckedRun(Declared):
+    """A recording: its length, and how it moves where its reference says that."""
 
-    Parameters
-    ----------
-    name : str
-        Effect.
-    detectability : float
-        d′: its size in standard deviations, the drive unknown.
-    confused_with : tuple of str
-        Effects that explain it as well: expected evidence below `SEPARATED`.
-    remedy : str
-        What would separate it.
-    """
+    name: Annotated[str, figure("Its name.", head="run")]
+    duration_s: Annotated[float, figure("Length.", "s", head="length")]
+    sample_rate_hz: Annotated[float | None, figure("Sample rate.", "Hz", head="rate", absent=True)] = None
+    fastest_rad_s: Annotated[float | None, figure("Largest rate.", "rad/s", absent=True)] = None
+    largest_acceleration_rad_s2: Annotated[
+        float | None, figure("Largest angular acceleration (99 % quantile).", "rad/s²", absent=True)
+    ] = None
+    fastest_m_s: Annotated[float | None, figure("Of a stage: largest speed.", "m/s", absent=True)] = None
+    largest_acceleration_m_s2: Annotated[
+        float | None, figure("Of a stage: largest acceleration (99 % quantile).", "m/s²", absent=True)
+    ] = None
+    turns: Annotated[float | None, figure("Turns, all directions summed.", head="turns", form=".3g", absent=True)] = (
+        None
+    )
+    share_forwards: Annotated[float | None, figure("Share of the time that it turns forwards.", absent=True)] = None
+    share_backwards: Annotated[float | None, figure("Share of the time that it turns backwards.", absent=True)] = None
+    share_at_rest: Annotated[float | None, figure("Share of the time at rest.", absent=True)] = None
+    lowest_degC: Annotated[float | None, figure("Lowest temperature.", "°C", absent=True)] = None
+    highest_degC: Annotated[float | None, figure("Highest temperature.", "°C", absent=True)] = None
 
-    name: str
-    detectability: float
-    confused_with: tuple[str, ...]
-    remedy: str
+    @property
+    def fastest(self) -> Annotated[str, figure("Largest rate or speed.", head="fastest", in_json=False)]:
+        """Largest rate or speed with its unit."""
+        return _with_unit(self.fastest_rad_s, "rad/s") or _with_unit(self.fastest_m_s, "m/s")
+
+    @property
+    def acceleration(self) -> Annotated[str, figure("Largest acceleration.", head="acceleration", in_json=False)]:
+        """Largest acceleration with its unit."""
+        angular, linear = self.largest_acceleration_rad_s2, self.largest_acceleration_m_s2
+        return _with_unit(angular, "rad/s²") or _with_unit(linear, "m/s²")
+
+    @property
+    def shares(self) -> Annotated[str, figure("Shares.", head="forwards / backwards / rest", in_json=False)]:
+        """Shares of the time in each direction and at rest, in percent."""
+        shares = [one for one in (self.share_forwards, self.share_backwards, self.share_at_rest) if one is not None]
+        return " / ".join(f"{100 * one:.0f}" for one in shares) + " %" if shares else ""
+
+    @property
+    def in_words(self) -> str:
+        """The recording in one line."""
+        parts = [
+            f"{self.duration_s:.4g} s",
+            self.sample_rate_hz and f"{self.sample_rate_hz:.4g} Hz",
+            self.fastest and f"up to {self.fastest}",
+            self.turns is not None and f"{self.turns:.3g} turns",
+            self.shares and f"forwards / backwards / at rest {self.shares}",
+        ]
+        return f"{self.name}: {', '.join(part for part in parts if part)}."
+
+
+def _with_unit(value: float | None, unit: str) -> str:
+    return "" if value is None else f"{value:.3g} {unit}"
+
+
+@dataclass(frozen=True)
+class EffectView(Declared):
+    """How well the motion shows an effect of its usual size."""
+
+    name: Annotated[str, figure("The effect.", head="effect")]
+    detectability: Annotated[
+        float,
+        figure(
+            "d′: its size in standard deviations, the motion unknown; below 5 it may be missed.", head="d′", form=".3g"
+        ),
+    ]
+    confused_with: Annotated[tuple[str, ...], figure("Effects that explain it as well.")]
+    remedy: Annotated[str, figure("What would separate it.")]
 
     @property
     def seen(self) -> bool:
         """Whether it is found nearly always."""
         return self.detectability >= Policy().seen
 
+    @property
+    def alike(self) -> Annotated[str, figure("The first of them.", head="not separable from", in_json=False)]:
+        """The first of the effects that explain it as well."""
+        return ", ".join(self.confused_with[:4])
+
 
 @dataclass(frozen=True)
-class RunCheck(PlottedResult):
-    """Quality of recordings, and the effects that their motion can show and separate.
-
-    Parameters
-    ----------
-    runs : tuple of dict
-        Of each run: name, length, rate, speeds, turns.
-    findings : tuple of str
-        What is odd about the data.
-    effects : tuple of EffectView
-        The twin's effects that have a size, the best seen first; empty for a free body.
-    advice : tuple of str
-        What one more minute should be.
+class RunCheck(Declared, PlottedResult):
+    """What recordings can show: quality of the data, and effects that their motion shows and separates.
 
     Examples
     --------
@@ -106,10 +152,13 @@ class RunCheck(PlottedResult):
     True
     """
 
-    runs: tuple[dict[str, Any], ...]
-    findings: tuple[str, ...]
-    effects: tuple[EffectView, ...]
-    advice: tuple[str, ...]
+    runs: Annotated[tuple[CheckedRun, ...], figure("The recordings.")]
+    findings: Annotated[tuple[str, ...], figure("What is odd about the data.")]
+    effects: Annotated[
+        tuple[EffectView, ...],
+        figure("The twin's effects that have a size, the best seen first; none of a free body."),
+    ]
+    advice: Annotated[tuple[str, ...], figure("What one more minute of recording should be.")]
 
     def to_columns(self) -> dict[str, NDArray[Any]]:
         """Return one row per effect: how well the motion shows it, and what it is confounded with."""
@@ -119,6 +168,43 @@ class RunCheck(PlottedResult):
             "seen": np.array([one.seen for one in self.effects], dtype=bool),
             "confused_with": text_column(", ".join(one.confused_with) for one in self.effects),
         }
+
+    def shown(self) -> Iterator[Table | str]:
+        """Yield the tables and sentences that people read."""
+        yield table("Recordings", self.runs, "name duration_s sample_rate_hz fastest acceleration turns shares")
+        for one in self.runs:
+            if one.lowest_degC is not None:
+                yield f"Temperature of {one.name}: {one.lowest_degC:.4g} to {one.highest_degC:.4g} °C."
+        yield self._data
+        if self.effects:
+            yield table(
+                "What this motion shows of the simulation's effects, each in its usual size",
+                self.effects,
+                "name detectability alike",
+                note="d′: size in standard deviations with the motion unknown; below 5 it may be missed.",
+            )
+        yield from self._advised
+
+    def in_short(self) -> Iterator[str]:
+        """Yield a few lines, to stand before a diagnosis."""
+        yield from (one.in_words for one in self.runs)
+        yield self._data
+        if self.effects:
+            alone = [one for one in self.effects if one.seen and not one.confused_with]
+            yield f"This motion shows {len(alone)} of {len(self.effects)} effects alone, each in its usual size."
+            if alike := [one.name for one in self.effects if one.confused_with]:
+                yield f"Not separable from others by it: {', '.join(alike)}."
+            if unseen := [one.name for one in self.effects if not one.seen]:
+                yield f"May be missed in their usual size: {', '.join(unseen)}."
+        yield from self._advised
+
+    @property
+    def _data(self) -> str:
+        return f"Data: {'; '.join(self.findings) or 'nothing odd.'}"
+
+    @property
+    def _advised(self) -> list[str]:
+        return [f"- {line}" for line in self.advice]
 
     def _heading(self) -> str:
         return "What the recordings can show"
@@ -132,15 +218,6 @@ class RunCheck(PlottedResult):
         return [
             Panel("detectability of effects of usual size", "d′, standard deviations", (sizes,), names, scale="zero")
         ]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the check as JSON holds it."""
-        return {
-            "runs": list(self.runs),
-            "findings": list(self.findings),
-            "effects": [vars(one) for one in self.effects],
-            "advice": list(self.advice),
-        }
 
 
 def check_runs(
@@ -172,40 +249,36 @@ def check_runs(
         findings += [f"{name}: {one}" for one in odd]
         if len(recording.gaps):
             findings.append(f"{name}: {len(recording.gaps)} gaps in its times")
+    seen = tuple(_with_temperature(name, one) for name, one in zip(names, recordings, strict=True))
     if model.drive_source == "gyro":
-        facts = tuple(
-            {"name": name, "duration_s": one.duration, **_temperature(one)}
-            for name, one in zip(names, recordings, strict=True)
-        )
-        return RunCheck(facts, tuple(findings), (), ())
+        return RunCheck(seen, tuple(findings), (), ())
     runs = [prepare_run(one, model, name=name) for one, name in zip(recordings, names, strict=True)]
-    facts = tuple(
-        _facts(run, name, model, useful) | _temperature(one)
-        for run, name, one in zip(runs, names, recordings, strict=True)
-    )
+    seen = tuple(_with_motion(one, run, model, useful) for one, run in zip(seen, runs, strict=True))
     effects = _effects(runs, model)
-    return RunCheck(facts, tuple(findings), effects, tuple(_advice(facts, effects, useful)))
+    return RunCheck(seen, tuple(findings), effects, tuple(_advice(seen, effects, useful)))
 
 
-def _facts(run: Run, name: str, model: WorldModel, useful: UsefulRun) -> dict[str, Any]:
-    """Return length, rate, speeds and, of what turns, turns of a run."""
+def _with_motion(seen: CheckedRun, run: Run, model: WorldModel, useful: UsefulRun) -> CheckedRun:
+    """Return a recording with its rate, speeds and, of what turns, turns."""
     known = np.isfinite(run.reference)
     t, drive = run.t[known], run.reference[known]
     place = drive if is_linear(model) else np.unwrap(drive)
     rate = np.gradient(place, t) if reads_place(model) else drive
-    unit, slow = ("m", useful.speed) if is_linear(model) else ("rad", useful.rate)
-    turns = {} if is_linear(model) else {"turns": turns_one_way(rate, t)}
-    return {
-        "name": name,
-        "duration_s": run.duration,
-        "sample_rate_hz": 1.0 / run.sample_period,
-        f"fastest_{unit}_s": float(np.max(np.abs(rate))),
-        f"largest_acceleration_{unit}_s2": float(np.quantile(np.abs(np.gradient(rate, t)), 0.99)),
-        **turns,
-        "share_forwards": float(np.mean(rate > slow)),
-        "share_backwards": float(np.mean(rate < -slow)),
-        "share_at_rest": float(np.mean(np.abs(rate) < 0.1 * slow)),
-    }
+    fastest = float(np.max(np.abs(rate)))
+    acceleration = float(np.quantile(np.abs(np.gradient(rate, t)), 0.99))
+    slow = useful.speed if is_linear(model) else useful.rate
+    found = replace(
+        seen,
+        duration_s=run.duration,
+        sample_rate_hz=1.0 / run.sample_period,
+        share_forwards=float(np.mean(rate > slow)),
+        share_backwards=float(np.mean(rate < -slow)),
+        share_at_rest=float(np.mean(np.abs(rate) < 0.1 * slow)),
+    )
+    if is_linear(model):
+        return replace(found, fastest_m_s=fastest, largest_acceleration_m_s2=acceleration)
+    turns = turns_one_way(rate, t)
+    return replace(found, fastest_rad_s=fastest, largest_acceleration_rad_s2=acceleration, turns=turns)
 
 
 def turns_one_way(rate: NDArray[np.float64], t: NDArray[np.float64]) -> float:
@@ -213,12 +286,13 @@ def turns_one_way(rate: NDArray[np.float64], t: NDArray[np.float64]) -> float:
     return float(np.ptp(cumulative_trapezoid(rate, t, initial=0.0)) / (2.0 * np.pi))
 
 
-def _temperature(recording: Recording) -> dict[str, float]:
-    """Return the lowest and the highest temperature of the board; empty if the recording has none."""
+def _with_temperature(name: str, recording: Recording) -> CheckedRun:
+    """Return a recording with the lowest and the highest temperature of the board, where it has any."""
+    seen = CheckedRun(name, recording.duration)
     temperature = recording.reference.get("temperature_degC")
     if temperature is None or not np.isfinite(temperature).any():
-        return {}
-    return {"lowest_degC": float(np.nanmin(temperature)), "highest_degC": float(np.nanmax(temperature))}
+        return seen
+    return replace(seen, lowest_degC=float(np.nanmin(temperature)), highest_degC=float(np.nanmax(temperature)))
 
 
 def _effects(runs: Sequence[Run], model: WorldModel) -> tuple[EffectView, ...]:
@@ -256,21 +330,26 @@ def _rivals(found: Distinguishability, place: int) -> list[str]:
     return [name for number, name in enumerate(found.effects) if close[number] and number != place]
 
 
-def _advice(facts: Sequence[dict[str, Any]], effects: Sequence[EffectView], useful: UsefulRun) -> list[str]:
+def _advice(runs: Sequence[CheckedRun], effects: Sequence[EffectView], useful: UsefulRun) -> list[str]:
     """Return what one more recording should be."""
     advice = []
-    if math.ceil(sum(one["duration_s"] for one in facts)) < useful.duration:
+    if math.ceil(sum(one.duration_s for one in runs)) < useful.duration:
         advice.append(f"record longer: {useful.duration:.0f} s at least, a minute is better")
-    ways = {way: any(one[f"share_{way}"] > useful.share for one in facts) for way in ("forwards", "backwards")}
-    if not all(ways.values()):
-        missing = next(one for one, there in ways.items() if not there)
-        way = "turn" if "turns" in facts[0] else "move"
+    turns = [one.turns for one in runs if one.turns is not None]
+    ways = {
+        "forwards": [one.share_forwards for one in runs],
+        "backwards": [one.share_backwards for one in runs],
+        "rest": [one.share_at_rest for one in runs],
+    }
+    missing = [way for way, shares in ways.items() if not any((one or 0.0) > useful.share for one in shares)]
+    if missing and missing[0] != "rest":
         advice.append(
-            f"{way} {missing} as well: what goes with the rate and with its size can't be separated otherwise"
+            f"{'turn' if turns else 'move'} {missing[0]} as well: what goes with the rate and with its size can't be "
+            "separated otherwise"
         )
-    if max(one.get("turns", useful.turns) for one in facts) < useful.turns:
+    if turns and max(turns) < useful.turns:
         advice.append("make several whole turns one way: an axis out of level and ripples show once per turn")
-    if not any(one["share_at_rest"] > useful.share for one in facts):
+    if "rest" in missing:
         advice.append("begin with a few seconds of rest: biases are seen there")
     unseen = [one for one in effects if not one.seen or one.confused_with]
     remedies = dict.fromkeys(one.remedy for one in unseen if one.remedy)

@@ -5,16 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import PPoly
 
+from gfimu.array.smooth_ramp import PEAK_OF_RAMP, smooth_ramp
+from gfimu.base.declared import Declared, figure
 from gfimu.diagnosis.data.table.spins import State
-from gfimu.geometry.smooth_ramp import PEAK_OF_RAMP, smooth_ramp
 
-__all__ = ["Leg", "TableProfile"]
+__all__ = ["Leg", "Segment", "TableProfile"]
 
 
 @dataclass(frozen=True)
@@ -34,7 +35,16 @@ class Leg:
 
 
 @dataclass(frozen=True)
-class TableProfile:
+class Segment(Declared):
+    """A piece of a profile as a scenario file has it under ``motion.segment``."""
+
+    kind: Annotated[str, figure("ramp or hold.")]
+    to_rad_s: Annotated[float | None, figure("Of a ramp: rate at its end.", "rad/s", absent=True)]
+    duration_s: Annotated[float, figure("Its length.", "s")]
+
+
+@dataclass(frozen=True)
+class TableProfile(Declared):
     """Spin of the table from rest through legs in a row.
 
     Parameters
@@ -46,17 +56,19 @@ class TableProfile:
     legs: tuple[Leg, ...]
 
     @property
-    def duration(self) -> float:
+    def duration(self) -> Annotated[float, figure("Length of the profile.", "s", key="duration_s")]:
         """Length, s."""
         return round(float(sum(leg.duration for leg in self.legs)), 9)
 
     @property
-    def peak_rate(self) -> float:
+    def peak_rate(self) -> Annotated[float, figure("Largest rate.", "rad/s", key="peak_rate_rad_s")]:
         """Largest rate, rad/s."""
         return max(abs(leg.to) for leg in self.legs)
 
     @property
-    def peak_acceleration(self) -> float:
+    def peak_acceleration(
+        self,
+    ) -> Annotated[float, figure("Largest angular acceleration.", "rad/s²", key="peak_acceleration_rad_s2")]:
         """Largest angular acceleration, rad/s²."""
         steps = np.abs(np.diff([0.0, *(leg.to for leg in self.legs)]))
         return float(PEAK_OF_RAMP * np.max(steps / [leg.duration for leg in self.legs]))
@@ -80,17 +92,14 @@ class TableProfile:
         angle: NDArray[np.float64] = self._angle(times) - self._angle(0.0)
         return State(angle, self._rate(times), self._rate.derivative()(times))
 
-    def to_segments(self) -> list[dict[str, Any]]:
-        """Return the entries of ``motion.segment`` in a scenario file."""
-        entries: list[dict[str, Any]] = []
-        rate = 0.0
-        for leg in self.legs:
-            if leg.to == rate:
-                entries.append({"kind": "hold", "duration_s": leg.duration})
-            else:
-                entries.append({"kind": "ramp", "to_rad_s": leg.to, "duration_s": leg.duration})
-            rate = leg.to
-        return entries
+    @property
+    def segments(self) -> Annotated[list[Segment], figure("The profile, piece by piece.")]:
+        """Its pieces for a scenario file."""
+        rates = [0.0, *(leg.to for leg in self.legs)]
+        return [
+            Segment("hold", None, leg.duration) if leg.to == rate else Segment("ramp", leg.to, leg.duration)
+            for rate, leg in zip(rates, self.legs, strict=False)
+        ]
 
     def in_words(self) -> list[str]:
         """Return one line per leg for people, a burst of reversals in one line."""

@@ -17,21 +17,19 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.array.array import AccelerometerArray
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.evidence import SCALES, inverse, log_evidence
-from gfimu.diagnosis.fit.linear import Linear, Point, energy_of, linearise, of_causes
+from gfimu.diagnosis.fit.linear import SETTLED, SHARES, Linear, Point, energy_of, linearise, of_causes
 from gfimu.diagnosis.fit.posterior import remembers_long
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.terms.cause import Cause, effects_of
 from gfimu.diagnosis.terms.jacobian import Jacobian
-from gfimu.geometry.array import AccelerometerArray
 
 __all__ = ["FEW", "SETTLED", "Fit", "determined", "fit", "is_rough", "linearly_without", "log_prior"]
 
 FEW = 3
 """Numerical: steps of a fit whose only other unknown is a drive, or that is only looked at; rounds of such fits."""
-SETTLED = 0.3  # numerical: nats that a step must promise to be taken
-_SHARES = (1.0, 0.3, 0.08)  # numerical: of a step that goes uphill
 _SHAPE_STEP = 0.3  # numerical: most that a shape moves in a step
 _SHAPE_PRIOR = 0.7  # numerical: standard deviation of that step
 _KEPT = 0.5  # numerical: share of its promise that a step must gain for a derivative to serve another one
@@ -152,7 +150,10 @@ def _is_long(stretches: Sequence[Stretch], point: Point) -> bool:
 
 
 def _descend(stretches: Sequence[Stretch], point: Point, policy: Policy) -> tuple[Point, Linear, int]:
-    """Take Gauss-Newton steps until they promise no more; returns point, linearisation there and number of steps."""
+    """Take Gauss-Newton steps until they promise no more; returns point, linearisation there and number of steps.
+
+    A step uphill, or to where there is no prediction or the equations have no solution, is rejected and shortened.
+    """
     array = stretches[0].model.array
     now = _energy(stretches, point)
     linear = linearise(stretches, point, of_causes(point))
@@ -161,17 +162,21 @@ def _descend(stretches: Sequence[Stretch], point: Point, policy: Policy) -> tupl
         step, promise = _step(point.causes, linear, policy.least_information)
         if promise < SETTLED and (done or not policy.least_information):
             break
-        for share in _SHARES:
+        for share in SHARES:
             trial = _moved(point, linear, share, step, array)
             there = _energy(stretches, trial)
-            if there <= now + SETTLED:
-                break
+            if there > now + SETTLED:
+                continue
+            kept = _dear(linear) if now - there > _KEPT * promise else None
+            try:
+                ahead = linearise(stretches, trial, of_causes(trial), jacobians=kept)
+            except np.linalg.LinAlgError:  # the equations there have no solution: no step either
+                continue
+            break
         else:
             break
         stalled = now - there < SETTLED
-        kept = _dear(linear) if now - there > _KEPT * promise else None
-        point, now, done = trial, there, done + 1
-        linear = linearise(stretches, point, of_causes(point), jacobians=kept)
+        point, now, linear, done = trial, there, ahead, done + 1
         if stalled:
             break
     return point, linear, done

@@ -12,7 +12,7 @@ from gfimu.diagnosis.data.body.stretch import BodyStretch
 from gfimu.diagnosis.data.cosine_basis import NoiseLevels
 from gfimu.diagnosis.data.run import Run
 from gfimu.diagnosis.data.stretch import Stretch, make_stretches
-from gfimu.diagnosis.fit.linear import Linear, Point, linearise
+from gfimu.diagnosis.fit.linear import Linear, Point, linearise, stepped
 from gfimu.diagnosis.fit.parallel import over_segments
 from gfimu.diagnosis.fit.posterior import Posterior
 from gfimu.diagnosis.policy import Policy
@@ -23,7 +23,7 @@ from gfimu.diagnosis.terms.hand.learning import first_noise, learnt_noise
 from gfimu.diagnosis.terms.jacobian import Jacobian
 from gfimu.diagnosis.terms.slow_modes import WeighedModes, WeighedPowers
 from gfimu.diagnosis.terms.spline import PushedSpin
-from gfimu.world_model import WorldModel, is_linear
+from gfimu.model.world_model import WorldModel, is_linear
 
 __all__ = [
     "FOLLOWED",
@@ -121,12 +121,15 @@ def learn_roughness(stretches: Sequence[Stretch], point: Point, rounds: int = 1)
     """Return the point with the roughness that its drives show under its causes."""
     jacobians: Sequence[Jacobian | None] | None = None
     for _ in range(rounds if all(drive.is_learnt for drive in point.drives) else 0):
-        linear = linearise(stretches, point, jacobians=jacobians)
+        try:
+            linear = linearise(stretches, point, jacobians=jacobians)
+        except np.linalg.LinAlgError:
+            if jacobians is None:
+                raise
+            break  # what was learnt last is as rough as can be solved
         jacobians = [one.jacobian for one in linear.posteriors]
-        drives = tuple(
-            drive.moved(step).relearned(one.covariance)
-            for drive, step, one in zip(point.drives, linear.drive_steps, linear.posteriors, strict=True)
-        )
+        moved = stepped(stretches, point, linear).drives
+        drives = tuple(drive.relearned(one.covariance) for drive, one in zip(moved, linear.posteriors, strict=True))
         point = replace(point, drives=drives)
     return point
 
@@ -141,7 +144,7 @@ def sharpened(stretches: Sequence[Stretch], point: Point, policy: Policy) -> Poi
         return point
     observations = sum(stretch.observations for stretch in stretches)
     now = linearise(stretches, point)
-    drives = [drive.moved(step) for drive, step in zip(point.drives, now.drive_steps, strict=True)]
+    drives = list(stepped(stretches, point, now).drives)
     acuities = [_acuity(*one) for one in zip(stretches, drives, point.levels, strict=True)]
     best = [_log_evidence(one) for one in now.posteriors]
     gaining = np.ones(len(drives), dtype=bool)
@@ -156,8 +159,11 @@ def sharpened(stretches: Sequence[Stretch], point: Point, policy: Policy) -> Poi
         gaining = np.array([cut.spline != drive.spline for cut, drive in zip(cuts, drives, strict=True)])
         if not gaining.any():
             break
-        closer = learn_roughness(stretches, replace(point, drives=tuple(cuts)))
-        there = linearise(stretches, closer)
+        try:
+            closer = learn_roughness(stretches, replace(point, drives=tuple(cuts)))
+            there = linearise(stretches, closer)
+        except np.linalg.LinAlgError:  # so many knots can't be solved for
+            break
         for place in np.flatnonzero(gaining):
             value = _log_evidence(there.posteriors[place])
             gaining[place] = value - best[place] > policy.knot_odds

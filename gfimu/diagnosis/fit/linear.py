@@ -22,7 +22,11 @@ from gfimu.diagnosis.terms.library import cause_columns
 from gfimu.diagnosis.terms.observed import observe
 from gfimu.diagnosis.terms.residue import Residue
 
-__all__ = ["Linear", "Point", "energy_of", "linearise", "of_causes", "with_residue"]
+__all__ = ["SETTLED", "SHARES", "Linear", "Point", "energy_of", "linearise", "of_causes", "stepped", "with_residue"]
+
+SETTLED = 0.3  # numerical: nats that a step must promise to be taken, and that it may lead uphill
+SHARES = (1.0, 0.3, 0.08)
+"""Numerical: of a step that leads uphill, or to where there is no prediction."""
 
 _Products = tuple[NDArray[np.float64], NDArray[np.float64]]
 ColumnsOf = Callable[[Stretch, Posterior], Columns]
@@ -121,6 +125,11 @@ def linearise(
         Derivatives by the drives, where they are taken as they were.
     responses : bool
         Whether it matters how the drives follow the unknowns.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If there is no prediction at the point, or its equations have no solution.
     """
     residues = point.residue.columns if point.residue is not None else (None,) * len(stretches)
     follow = responses or point.residue is not None
@@ -140,6 +149,8 @@ def linearise(
 
     rows = over_segments(one, stretches, point.drives, point.levels, known, residues)
     posteriors, grams, scores, ways = zip(*rows, strict=True)
+    if not all(np.isfinite(part).all() for part in (*grams, *scores, *(own.objective for own in posteriors))):
+        raise np.linalg.LinAlgError("the normal equations are not finite")
     whole = Linear(
         np.sum(grams, axis=0),
         np.sum(scores, axis=0),
@@ -176,24 +187,34 @@ def _without_residue(whole: Linear, count: int, explained: float) -> Linear:
 
 
 def energy_of(stretches: Sequence[Stretch], point: Point) -> float:
-    """Return misfit and prior energy of a point, its drives held, a residue at its best."""
+    """Return misfit and prior energy of a point, its drives held, a residue at its best; ∞ without a prediction."""
 
     def one(stretch: Stretch, drive: Drive, levels: NoiseLevels, residue: Columns | None) -> tuple[float, _Products]:
         effects = effects_of(point.causes, stretch.model.array, stretch.index)
         if residue is None:
             return energy(stretch, drive, effects, levels), (np.zeros((0, 0)), np.zeros(0))
-        prediction = stretch.predict(effects, drive.spin)
-        if not np.isfinite(prediction).all():
-            return np.inf, (np.zeros((0, 0)), np.zeros(0))
-        seen = observe(stretch, prediction, levels)
+        seen = observe(stretch, stretch.predict(effects, drive.spin), levels)
         return seen.misfit + drive.energy(), seen.products(residue)
 
     residues = point.residue.columns if point.residue is not None else (None,) * len(stretches)
-    rows = over_segments(one, stretches, point.drives, point.levels, residues)
-    total = float(sum(row[0] for row in rows))
-    if not np.isfinite(total):
+    try:
+        with np.errstate(over="ignore", invalid="ignore"):
+            rows = over_segments(one, stretches, point.drives, point.levels, residues)
+            taken = 0.0 if point.residue is None else _taken([row[1] for row in rows])
+            total = float(sum(row[0] for row in rows)) - taken
+    except np.linalg.LinAlgError:
         return np.inf
-    return total - _taken([row[1] for row in rows if row[1] is not None]) if point.residue is not None else total
+    return total if np.isfinite(total) else np.inf
+
+
+def stepped(stretches: Sequence[Stretch], point: Point, linear: Linear) -> Point:
+    """Return the point with its drives moved to their best in a linear world; they stay where that leads uphill."""
+    for share in SHARES:
+        steps = zip(point.drives, linear.drive_steps, strict=True)
+        moved = replace(point, drives=tuple(drive.moved(share * step) for drive, step in steps))
+        if energy_of(stretches, moved) <= linear.energy + SETTLED:
+            return moved
+    return point
 
 
 def _explained(residue: Residue, posteriors: Sequence[Posterior]) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import multiprocessing
 import os
 import pickle
@@ -11,11 +12,14 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager
+from contextvars import copy_context
 from functools import cache
 from multiprocessing.connection import Connection, wait
 from typing import Any, TypeVar
 
 from threadpoolctl import ThreadpoolController
+
+from gfimu.diagnosis.time_limit import expire
 
 __all__ = ["each_apart", "one_blas_thread", "over_segments"]
 
@@ -35,8 +39,12 @@ def over_segments(work: Callable[..., Result], *columns: Iterable[Any]) -> list[
     return _on_threads(lambda row: work(*row), rows, workers)
 
 
-def each_apart(work: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
+def each_apart(
+    work: Callable[[Item], Result], items: Sequence[Item], *, keep: Callable[[Result], None] | None = None
+) -> list[Result]:
     """Call ``work``, which changes nothing, with each item; results in the order of the items.
+
+    ``keep`` gets each result as soon as it is there: an interrupt takes away only what is not yet done.
 
     Where the system can split a process, on as many as there are processors: threads would wait for the interpreter
     half of their time. What ``work`` needs is there already in a process that is split off; only results are sent, and
@@ -47,11 +55,18 @@ def each_apart(work: Callable[[Item], Result], items: Sequence[Item]) -> list[Re
     RuntimeError
         If a process ends without an answer, as where memory is short.
     """
+    kept = keep or (lambda result: None)
+
+    def here(item: Item) -> Result:
+        result = work(item)
+        kept(result)
+        return result
+
     workers = min(len(items), _processors())
     if workers < 2:
-        return [work(item) for item in items]
+        return [here(item) for item in items]
     if sys.platform != "linux":  # a process can't be split, or must not be
-        return _on_threads(work, items, workers)
+        return _on_threads(here, items, workers)
     # Items are dealt out while they are done, as some take much longer than others.
     todo = iter(range(len(items)))
     results: dict[int, Result] = {}
@@ -67,6 +82,7 @@ def each_apart(work: Callable[[Item], Result], items: Sequence[Item]) -> list[Re
                 assert isinstance(pipe, Connection)
                 number, result = _answer(pipe, work, items)
                 results[number] = result
+                kept(result)
                 following = next(todo, None)
                 pipe.send(following)
                 if following is None:
@@ -74,7 +90,7 @@ def each_apart(work: Callable[[Item], Result], items: Sequence[Item]) -> list[Re
     finally:
         for process in processes:
             process.end()
-    return [results[number] if number in results else work(item) for number, item in enumerate(items)]
+    return [results[number] if number in results else here(item) for number, item in enumerate(items)]
 
 
 def _split_off(work: Callable[[Item], Result], items: Sequence[Item], most: int) -> Iterator[_Apart]:
@@ -101,8 +117,13 @@ def _answer(pipe: Connection, work: Callable[[Item], Result], items: Sequence[It
 
 
 def _on_threads(work: Callable[[Item], Result], items: Sequence[Item], workers: int) -> list[Result]:
+    contexts = [copy_context() for _ in items]
     with one_blas_thread(), ThreadPoolExecutor(workers) as pool:
-        return list(pool.map(work, items))
+        try:
+            return list(pool.map(lambda context, item: context.run(work, item), contexts, items))
+        except KeyboardInterrupt:
+            expire()
+            raise
 
 
 class _UnsendableError(Exception):
@@ -121,7 +142,7 @@ class _Apart:
     def __init__(self, work: Callable[[Item], Result], items: Sequence[Item]) -> None:
         context = multiprocessing.get_context("fork")
         self.pipe, theirs = context.Pipe()
-        self._process = context.Process(target=_serve, args=(work, items, theirs), daemon=True)
+        self._process = context.Process(target=_serve, args=(work, items, theirs, os.getpid()), daemon=True)
         with warnings.catch_warnings():
             # Other threads (a progress bar) hold no lock that the algebra asks for.
             warnings.simplefilter("ignore", DeprecationWarning)
@@ -138,8 +159,17 @@ class _Apart:
         self._process.close()
 
 
-def _serve(work: Callable[[Item], Result], items: Sequence[Item], pipe: Connection) -> None:
+def _ends_with(parent: int) -> bool:
+    """Let the system end this process as soon as its parent has ended, however that was; False where it has already."""
+    set_parent_death_signal = 1  # of prctl (Linux)
+    ctypes.CDLL(None).prctl(set_parent_death_signal, signal.SIGKILL)
+    return os.getppid() == parent
+
+
+def _serve(work: Callable[[Item], Result], items: Sequence[Item], pipe: Connection, parent: int) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the process that this was split off from ends it
+    if not _ends_with(parent):
+        return
     with one_blas_thread():
         while True:
             try:
@@ -149,8 +179,8 @@ def _serve(work: Callable[[Item], Result], items: Sequence[Item], pipe: Connecti
             if number is None:
                 return
             try:
-                answer: tuple[int, Result | None, Exception | None] = (number, work(items[number]), None)
-            except Exception as error:  # noqa: BLE001 - raised again where the answer is received
+                answer: tuple[int, Result | None, BaseException | None] = (number, work(items[number]), None)
+            except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 - raised again where it is received
                 answer = (number, None, error)
             try:
                 pipe.send(answer)

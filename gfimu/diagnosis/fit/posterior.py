@@ -31,7 +31,7 @@ from gfimu.diagnosis.terms.hand.posterior import condition_hand
 from gfimu.diagnosis.terms.jacobian import Jacobian, Reach, differentiate, measured_reach
 from gfimu.diagnosis.terms.observed import Observed, observe
 from gfimu.diagnosis.terms.slow_modes import SlowModes, WeighedModes
-from gfimu.world_model import Effect, acts_back, memory_of
+from gfimu.model.world_model import Effect, acts_back, memory_of
 
 __all__ = ["Posterior", "condition", "energy", "posterior_of", "remembers_long"]
 
@@ -42,16 +42,13 @@ _LEAST_SHARE = 1e-6  # numerical: of a channel's slow noise in a mode, below whi
 
 
 def energy(stretch: Stretch, drive: Any, effects: Sequence[Effect], levels: Any) -> float:
-    """Return misfit and prior energy at a drive that is held."""
-    if isinstance(drive, HandDrive) and isinstance(stretch, BodyStretch):
-        try:
+    """Return misfit and prior energy at a drive that is held; infinite where the simulation has no answer."""
+    try:
+        if isinstance(drive, HandDrive) and isinstance(stretch, BodyStretch):
             return condition_hand(stretch, drive, effects, levels).energy
-        except np.linalg.LinAlgError:
-            return np.inf
-    prediction = stretch.predict(effects, drive.spin)
-    if not np.isfinite(prediction).all():
+        return observe(stretch, stretch.predict(effects, drive.spin), levels).misfit + drive.energy()
+    except np.linalg.LinAlgError:
         return np.inf
-    return observe(stretch, prediction, levels).misfit + drive.energy()
 
 
 @dataclass(frozen=True)

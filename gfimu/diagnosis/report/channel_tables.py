@@ -14,12 +14,12 @@ import numpy as np
 from matplotlib.colors import SymLogNorm, to_hex
 from numpy.typing import NDArray
 
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.results.colours import DIVERGING
 from gfimu.diagnosis.criticism.views.dependence import Fingerprint
 from gfimu.diagnosis.criticism.views.residuals import ResidualSize
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.report.plain_words import three_digits
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.visual.colours import DIVERGING
 
 __all__ = ["ChannelBars", "FingerprintCell", "FingerprintRow", "RmsRow", "channel_bars", "fingerprint_rows"]
 

@@ -9,14 +9,9 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
-from gfimu.diagnosis.criticism.views.dependence import Dependence
-from gfimu.diagnosis.criticism.views.residual_spectrum import ResidualSpectrum
-from gfimu.diagnosis.criticism.views.residuals import ResidualSize, Whiteness
-from gfimu.diagnosis.criticism.views.rigid_motion import BandPower
-from gfimu.diagnosis.criticism.views.run_view import RunView
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.geometry.turning_axis import TurningAxis
-from gfimu.visual.colours import (
+from gfimu.array.array import AccelerometerArray
+from gfimu.array.turning_axis import TurningAxis
+from gfimu.base.results.colours import (
     AFTER_ON_PAPER,
     BEFORE_ON_PAPER,
     INK,
@@ -25,6 +20,11 @@ from gfimu.visual.colours import (
     chip_colour,
     css,
 )
+from gfimu.diagnosis.criticism.views.dependence import Dependence
+from gfimu.diagnosis.criticism.views.residual_spectrum import ResidualSpectrum
+from gfimu.diagnosis.criticism.views.residuals import ResidualSize, Whiteness
+from gfimu.diagnosis.criticism.views.rigid_motion import BandPower
+from gfimu.diagnosis.criticism.views.run_view import RunView
 from gfimu.visual.page import PlotLimits
 from gfimu.visual.page.svg import ON_PAGE, svg_text
 from gfimu.visual.rig.figure import array_figure, channel_style

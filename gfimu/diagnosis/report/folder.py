@@ -6,12 +6,12 @@ import warnings
 from collections.abc import Collection, Mapping
 from pathlib import Path
 
+from gfimu.base.errors import OmittedFileWarning
+from gfimu.base.files.atomic_file import atomic_folder
+from gfimu.base.files.outputs import OutputFolder, check_outputs
+from gfimu.base.optional_packages import install_command, missing, packages_of
 from gfimu.diagnosis.report.rig import DrawnRig
 from gfimu.diagnosis.verdict.verdict import Diagnosis
-from gfimu.errors import OmittedFileWarning
-from gfimu.files.atomic_file import atomic_folder
-from gfimu.files.outputs import OutputFolder, check_outputs
-from gfimu.optional_packages import install_command, missing, packages_of
 
 __all__ = ["FILES", "check_folder", "files_of", "files_to_write", "warn_of_omitted", "write_diagnosis"]
 

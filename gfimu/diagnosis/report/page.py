@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 from jinja2 import Environment, FileSystemLoader, select_autoescape
 
-from gfimu import __version__
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import printable
+from gfimu.base.files.atomic_file import write_text
+from gfimu.base.version import __version__
 from gfimu.diagnosis.criticism.views.residuals import ResidualViews, residual_views
-from gfimu.diagnosis.criticism.views.rigid_motion import RigidMotion
 from gfimu.diagnosis.criticism.views.run_view import RunView
 from gfimu.diagnosis.report import figures
 from gfimu.diagnosis.report.channel_tables import channel_bars, fingerprint_rows
@@ -34,8 +36,6 @@ from gfimu.diagnosis.report.zooming import dependence_plot, residual_plot, spect
 from gfimu.diagnosis.verdict.parts import NamedCause
 from gfimu.diagnosis.verdict.verdict import Diagnosis
 from gfimu.diagnosis.verdict.wording import SAME_SHARE
-from gfimu.files.atomic_file import write_text
-from gfimu.geometry.array import AccelerometerArray
 from gfimu.visual.page import Packed, page_plots, page_style
 from gfimu.visual.page.svg import themed
 from gfimu.visual.rig import package_of
@@ -89,16 +89,17 @@ def report_html(diagnosis: Diagnosis, rig: DrawnRig | None = None) -> str:
         lstrip_blocks=True,
     )
     environment.filters["odds"] = odds
-    return environment.get_template("report.html.j2").render(_content(diagnosis, rig or DrawnRig()))
+    return printable(environment.get_template("report.html.j2").render(_content(diagnosis, rig or DrawnRig())))
 
 
 def _content(diagnosis: Diagnosis, rig: DrawnRig) -> Mapping[str, Any]:
     array = diagnosis.twin.array
-    bias_instability = float(diagnosis.noise.get("bias_instability_m_s2", 0.0))
+    bias_instability = diagnosis.noise.bias_instability_m_s2 or 0.0
     seen = [run for run in diagnosis.runs if run.valid.any() and len(run.t) > 1]
     found = [residual_views(run, array.channels, bias_instability=bias_instability) for run in seen]
     label, tone = _VERDICTS[diagnosis.verdict]
     label += " in part" if diagnosis.in_part else ""
+    label = "Interrupted" if diagnosis.interrupted and diagnosis.verdict == "unknown" else label
     data, plots = Packed(), {}
     if seen:
         plots["residual"] = residual_plot(seen[0], found[0].size, array, data)
@@ -261,7 +262,9 @@ def _views(diagnosis: Diagnosis, views: ResidualViews, plots: dict[str, Any], da
             caption = "Rms over the channels beside that of noise; drawn at its peaks."
             show(title, spectrum, figures.spectrum_figure(spectrum), caption, _NO_LINE, spectrum_plot(spectrum, data))
     if diagnosis.rigid is not None and diagnosis.rigid.combinations:
-        rigid = _RigidView(_place(diagnosis.rigid), len(diagnosis.rigid.excesses))
+        # The noise of the reference is a spin too: where nothing was found, a spin says nothing.
+        calm = diagnosis.rigid.place == "spin" and diagnosis.verdict == "nothing_found"
+        rigid = _RigidView("" if calm else diagnosis.rigid.sentence, len(diagnosis.rigid.excesses))
         caption = "Power over that of noise, of the given simulation's residual, by what moves together."
         show("whose motion is it?", rigid, figures.rigid_figure(diagnosis.rigid.power), caption, _NO_PLACE)
     caption = "Cumulative periodogram of each channel; that of noise stays in the band."
@@ -275,8 +278,3 @@ class _RigidView:
 
     sentence: str
     looks: int
-
-
-def _place(rigid: RigidMotion) -> str:
-    """Return what the division of the residual shows; of a spin nothing, as the noise of the reference is one too."""
-    return "" if rigid.place == "spin" else rigid.sentence

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gfimu.base.units import NAME, NUMBER, RATIO, STANDARD_GRAVITY, key_name
 from gfimu.diagnosis.criticism.views.run_view import RunView
 from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.verdict.parts import NamedCause
+from gfimu.diagnosis.verdict.parts import NamedCause, NoiseLevels
 from gfimu.diagnosis.verdict.verdict import Diagnosis
-from gfimu.units import NAME, NUMBER, RATIO, STANDARD_GRAVITY, key_name
 
 __all__ = [
     "ParameterText",
@@ -31,19 +31,6 @@ __all__ = [
 
 _OF_A_CALIBRATION = frozenset({"bias", "scale_factor", "misalignment", "cross_axis"})
 _THOUSANDTHS = ("rad", "m", "s")
-_NOISE_LEVELS = {
-    "white_over_data_sheet": ("white noise of the channels over that of the data sheet (median)", ""),
-    "bias_instability_m_s2": ("bias instability (median of the channels)", "m/s²"),
-    "bias_instability_largest_m_s2": ("largest bias instability", "m/s²"),
-    "bias_instability_largest_channel": ("channel of the largest bias instability:", ""),
-    "reference_white": ("white noise of the reference", "rad/s"),
-    "time_jitter_s": ("jitter of the sample times", "s"),
-    "disagreement_s": ("disagreement of the channels over the rate of change of their readings", "s"),
-    "gyro_bias_rad_s": ("bias of the gyro", "rad/s"),
-    "impossible_values": ("values that can't be a measurement", ""),
-    "calibration_residue": ("size of the small corrections (calibration residue)", ""),
-}
-"""Words and unit of each level in `Diagnosis.noise`."""
 _SMALL = 0.1
 _MOST_DECIMALS = 5
 _MOST_DIGITS = 100
@@ -79,10 +66,12 @@ def headline(diagnosis: Diagnosis) -> str:
             return "No single thing is wrong: the simulation's numbers are all a little off, as after a calibration."
         case "nothing_found":
             return "Nothing is wrong with the simulation that this recording could show."
+        case "unknown" if diagnosis.interrupted:
+            return diagnosis.sentences[0]
+        case "unknown" if diagnosis.unexplained.mistake:
+            return f"The files do not fit these data: {diagnosis.unexplained.mistake}."
         case "unknown" if found:
             return f"Found: {_joined(found)}. Something else is real too, and nothing in the library explains it."
-        case "unknown" if diagnosis.sentences[:1] and diagnosis.sentences[0].startswith("No verdict"):
-            return diagnosis.sentences[0]
         case "unknown":
             return "Something real is missing in the simulation, and nothing in the library explains it."
         case "ambiguous":
@@ -93,8 +82,9 @@ def headline(diagnosis: Diagnosis) -> str:
             certain = [_short(diagnosis, cause) for cause in diagnosis.causes if cause not in contested]
             return f"Found: {_joined(certain)}. {text.replace('Something', 'Something else', 1)}" if certain else text
         case _ if diagnosis.in_part:
-            share = percent(diagnosis.gain.share_of_excess_removed)
-            return f"Found in part what the simulation leaves out: {_joined(found)} ({share} of the error is gone)."
+            share = diagnosis.gain.share_of_excess_removed
+            gone = f" ({percent(share)} of the error is gone)" if math.isfinite(share) else ""
+            return f"Found in part what the simulation leaves out: {_joined(found)}{gone}."
         case _ if len(found) == 1:
             return f"Found what the simulation leaves out: {found[0]}."
         case _:
@@ -140,11 +130,12 @@ def story(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict == "nothing_found":
         return text + "No cause in the library, and no pattern of any other kind, predicts the data better than chance."
     parts = [_put_in(diagnosis), _on_unseen_data(diagnosis), _of_absolute_time(diagnosis), _in_library(diagnosis)]
-    if diagnosis.unexplained.significant:
-        parts.append(f"Left unexplained: {diagnosis.unexplained.signature}. ")
-    level = float(diagnosis.noise.get("bias_instability_largest_m_s2", 0.0))
+    if diagnosis.unexplained.significant and not diagnosis.interrupted:
+        size = "" if diagnosis.verdict == "unknown" else f" ({diagnosis.residual.left_in_words})"
+        parts.append(f"Left unexplained{size}: {diagnosis.unexplained.signature}. ")
+    level = diagnosis.noise.bias_instability_largest_m_s2 or 0.0
     if level > 0.0:
-        name = diagnosis.noise["bias_instability_largest_channel"]
+        name = diagnosis.noise.bias_instability_largest_channel
         parts.append(f"The largest bias instability is that of {name}, {level / STANDARD_GRAVITY * 1e3:.2g} mg. ")
     return (text + "".join(parts)).strip()
 
@@ -232,18 +223,18 @@ def parameter_texts(cause: NamedCause, units: Mapping[str, str]) -> list[Paramet
     return texts
 
 
-def noise_texts(noise: Mapping[str, float | str], *, linear: bool = False) -> list[str]:
+def noise_texts(noise: NoiseLevels, *, linear: bool = False) -> list[str]:
     """Return the noise levels of a diagnosis as people read them: name, value and unit.
 
     ``linear``: the reference is that of a carriage. A level of zero was not found and is left out.
     """
     texts = []
-    for key, value in noise.items():
-        words, unit = _NOISE_LEVELS.get(key, (key.replace("_", " "), ""))
-        if value == 0:
-            continue
-        unit = unit.replace("rad/s", "m/s") if linear else unit
-        texts.append(f"{words} {value if isinstance(value, str) else _number(value, unit).strip()}")
+    for name, key in noise.keys().items():
+        value = getattr(noise, name)
+        if value:
+            words = f"{key.meaning[0].lower()}{key.meaning[1:-1]}"
+            unit = key.unit.replace("rad/s", "m/s") if linear else key.unit
+            texts.append(f"{words}: {value}" if isinstance(value, str) else f"{words} {_number(value, unit).strip()}")
     return texts
 
 
@@ -255,7 +246,7 @@ def gain_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
         ("rate error, rms", _number(gain.rate_rmse_before, "rad/s"), _number(gain.rate_rmse_after, "rad/s")),
         ("position drift", _number(gain.drift_before, "m"), _number(gain.drift_after, "m")),
     ]
-    return [row for row in rows if row[1] or row[2]]
+    return [row for row in rows if row[1] != row[2]]  # also where neither could be measured
 
 
 def next_steps(diagnosis: Diagnosis) -> list[str]:
@@ -297,8 +288,13 @@ def _by_verdict(diagnosis: Diagnosis) -> list[str]:
             remedies = dict.fromkeys(one.would_be_separated_by for one in diagnosis.causes if one.would_be_separated_by)
             apart = [f"To separate the candidates, record: {remedy}." for remedy in remedies]
             return [*apart, "Give both recordings to one call of gfimu diagnose; it fits them together."]
+        case "unknown" if diagnosis.interrupted:
+            return ["Run it again with more time (--time-limit), or on a part of the recording."]
         case "unknown":
-            steps = ["Look at the residual views of the report for where the discrepancy sits."]
+            place = "" if diagnosis.rigid is None else diagnosis.rigid.sentence
+            steps = [place or "Look at the residual views of the report for where the discrepancy sits."]
+            if diagnosis.unexplained.mistake:
+                steps = [f"Check the files: {diagnosis.unexplained.mistake}."]
             if diagnosis.unexplained.extends_twin:
                 steps.append("Until it has a name, simulate with twin.toml: its terms called unknown describe it.")
             return [*steps, "Record another run with another motion: what stays is in the rig or the sensors."]

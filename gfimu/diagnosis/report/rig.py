@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from gfimu.array.array import AccelerometerArray
+from gfimu.array.turning_axis import TurningAxis
 from gfimu.diagnosis.criticism.views.run_view import RunView
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.geometry.turning_axis import TurningAxis
 
 if TYPE_CHECKING:
     from gfimu.visual.scene import Shape

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.array.array import AccelerometerArray
 from gfimu.diagnosis.criticism.views.dependence import Dependence
 from gfimu.diagnosis.criticism.views.residual_spectrum import ResidualSpectrum
 from gfimu.diagnosis.criticism.views.residuals import ResidualSize
 from gfimu.diagnosis.criticism.views.run_view import RunView
-from gfimu.geometry.array import AccelerometerArray
 from gfimu.visual.page import Packed, PlotLimits, enveloped
 from gfimu.visual.plots import broken_at_gaps
 

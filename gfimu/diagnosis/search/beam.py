@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
 
@@ -16,7 +16,7 @@ from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.screening import Hypothesis, Screening
 from gfimu.diagnosis.terms.cause import ALIKE, Cause
 
-__all__ = ["STARTS", "Blocks", "Candidate", "grown_sets", "leading_sets"]
+__all__ = ["STARTS", "Blocks", "Candidate", "grown_sets", "leading_sets", "promise"]
 
 _GROWN = 3  # numerical: best effects by which a set is grown
 _FRONT, _PARTNERS = 8, 30  # numerical: sets that are grown, and how many of the best partners of each are scored
@@ -137,6 +137,28 @@ def leading_sets(blocks: Blocks, most: int, policy: Policy) -> list[Candidate]:
     every.sort(key=lambda one: -one.log_odds)
     worth = (one for one in _distinct(every, blocks.hypotheses) if _is_worth(blocks, one, policy))
     return list(islice(worth, policy.beam))
+
+
+def promise(blocks: Blocks, causes: Sequence[Cause], others: Collection[str], policy: Policy) -> float:
+    """Return by how much sets with some other effects are more probable than a set of causes in a linear world, nats.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        Normal equations about those causes, with the other effects among the hypotheses.
+    causes : sequence of Cause
+        The set.
+    others : collection of str
+        Names of the other effects.
+    policy : Policy
+        Thresholds.
+    """
+    sets = leading_sets(blocks, min(len(causes) + 1, policy.most_causes), policy)
+    new = [
+        one.log_odds for one in sets if any(blocks.hypotheses[member].cause.name in others for member in one.members)
+    ]
+    present = blocks.log_odds([blocks.nearest(cause) for cause in causes]) if causes else 0.0
+    return max(new, default=-np.inf) - present
 
 
 def _exchanged(blocks: Blocks, members: tuple[int, ...]) -> list[Candidate]:

@@ -18,7 +18,8 @@ from gfimu.diagnosis.search.screening import Screening, screen
 from gfimu.diagnosis.search.sets import Key, Sets, has_stalled, prune
 from gfimu.diagnosis.terms.cause import Cause, effects_of
 from gfimu.diagnosis.terms.drive import Drive
-from gfimu.world_model import memory_of
+from gfimu.diagnosis.time_limit import what_ended
+from gfimu.model.world_model import memory_of
 
 __all__ = ["Explanation", "exactly", "explain", "explained", "reduced"]
 
@@ -46,20 +47,20 @@ class Explanation:
     elsewhere : tuple of Fit
         The best set under each other model of the nuisance parameters, its log posterior less what that model needs
         more than this one.
-    interrupted : bool
-        Whether the search was ended by an interrupt.
+    interrupted : str
+        What ended the search before it was done; empty where nothing did. It has no screening then.
     """
 
     best: Fit
     nothing: Fit
     without: dict[str, Fit]
     rivals: tuple[Fit, ...]
-    screening: Screening
+    screening: Screening | None
     stretches: tuple[Stretch, ...] = ()
     fits: int = 0
     by_reference: tuple[Drive, ...] = ()
     elsewhere: tuple[Fit, ...] = ()
-    interrupted: bool = False
+    interrupted: str = ""
 
 
 def explain(
@@ -123,7 +124,7 @@ def _started(stretches: Sequence[Stretch], reference: Point, policy: Policy) -> 
 def _searched(sets: Sets, progress: Report) -> Explanation:
     """Screen, fit the leaders and learn the nuisances, until the most probable set repeats itself.
 
-    An interrupt (Ctrl-C) ends the search with what is known by then.
+    An interrupt (Ctrl-C, the time limit) ends the search with what is known by then.
     """
     policy, fits, seen, last = sets.policy, 0, set[Key](), None
     try:
@@ -141,10 +142,18 @@ def _searched(sets: Sets, progress: Report) -> Explanation:
             if number > 0 and (best.key in seen or has_stalled(sets.stretches, before, best, policy)):
                 break
             seen.add(best.key)
-            learnt = _relearned(sets.stretches, best, policy, sharpen=best.key != before.key)
-            sets = _under(sets, learnt, _near(sets, best))
-    except KeyboardInterrupt:
-        return replace(explained(sets, prune(sets), fits + sets.count), interrupted=True)
+            try:
+                learnt = _relearned(sets.stretches, best, policy, sharpen=best.key != before.key)
+            except np.linalg.LinAlgError:  # what would be learnt leaves nothing that can be solved
+                break
+            following = _under(sets, learnt, _near(sets, best))
+            if not following.found:
+                break
+            sets = following
+    except KeyboardInterrupt as stop:
+        rest = tuple(one for one in sets.ranked() if one.causes and one is not sets.best)
+        nothing = sets.found.get(frozenset(), sets.best)
+        return Explanation(sets.best, nothing, {}, rest, None, tuple(sets.stretches), interrupted=what_ended(stop))
     best = prune(sets)
     return explained(sets, best, fits + sets.count, last[1] if last is not None and best.key == last[0] else None)
 
@@ -269,7 +278,7 @@ def _fit_other_shapes(sets: Sets, best: Fit) -> None:
         rest = sets.fit([replace(best.point, causes=others)])[0] if cause.free_shape else None
         if rest is None:
             continue
-        screening = screen(sets.stretches, rest.point, only=cause.name)
+        screening = screen(sets.stretches, rest.point, only={cause.name})
         blocks = Blocks(screening, sets.policy)
         members = [blocks.nearest(other) for other in rest.causes]
         points = []

@@ -8,12 +8,14 @@ from dataclasses import replace
 import numpy as np
 
 from gfimu.diagnosis.data.stretch import Stretch
+from gfimu.diagnosis.fit.gauss_newton import Fit
 from gfimu.diagnosis.fit.learn import LEARNINGS, learn_noise, learn_roughness, starting_point
 from gfimu.diagnosis.fit.linear import Point, with_residue
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.explain import explained
 from gfimu.diagnosis.search.nuisance_models import Understanding, understand
 from gfimu.diagnosis.search.sets import Sets, prune
+from gfimu.diagnosis.time_limit import unlimited, what_ended
 
 __all__ = ["spread_over_runs", "understand_any_length"]
 
@@ -50,15 +52,35 @@ def understand_any_length(
         return understand(stretches, policy, report, models=models)
     some = [stretches[place] for place in chosen]
     part = understand(some, policy, lambda s, text: report(0.6 * s, text), models=models)
-    report(0.6, "the whole length")
-    best = part.explanation.best
+    if not part.explanation.interrupted:
+        try:
+            return _over_all(stretches, chosen, part, policy, report)
+        except KeyboardInterrupt as stop:
+            part = replace(part, explanation=replace(part.explanation, interrupted=what_ended(stop)))
+    with unlimited():
+        point = _started(stretches, chosen, part.explanation.best, policy)
+    best = replace(part.explanation.best, point=point)
+    nothing = replace(part.explanation.nothing, point=replace(point, causes=()))
+    return replace(part, explanation=replace(part.explanation, best=best, nothing=nothing, stretches=tuple(stretches)))
+
+
+def _started(stretches: Sequence[Stretch], chosen: Sequence[int], best: Fit, policy: Policy) -> Point:
+    """Return the causes of a fit of some stretches with its drives there, and those of the reference in the others."""
     start = starting_point(stretches, policy.knots)
     of_run = {stretches[place].index: levels for place, levels in zip(chosen, best.point.levels, strict=True)}
     levels = tuple(of_run.get(stretch.index, best.point.levels[0]) for stretch in stretches)
     drives = list(start.drives)
     for place, drive in zip(chosen, best.point.drives, strict=True):
         drives[place] = drive
-    point = _with_residue(stretches, Point(best.causes, tuple(drives), levels), part.residue)
+    return Point(best.causes, tuple(drives), levels)
+
+
+def _over_all(
+    stretches: Sequence[Stretch], chosen: Sequence[int], part: Understanding, policy: Policy, report: Report
+) -> Understanding:
+    """Fit what was found in some stretches to all of them."""
+    report(0.6, "the whole length")
+    point = _with_residue(stretches, _started(stretches, chosen, part.explanation.best, policy), part.residue)
     point = learn_roughness(stretches, point, LEARNINGS)
     sets = Sets(stretches, point, policy)
     found = sets.fit([point])[0]

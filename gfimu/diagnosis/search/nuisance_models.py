@@ -25,6 +25,7 @@ from gfimu.diagnosis.search.explain import Explanation, exactly, explain
 from gfimu.diagnosis.search.sets import Sets, has_stalled, prune
 from gfimu.diagnosis.terms.jacobian import Jacobian
 from gfimu.diagnosis.terms.residue import Residue
+from gfimu.diagnosis.time_limit import what_ended
 
 __all__ = ["Understanding", "understand"]
 
@@ -55,6 +56,11 @@ class Understanding:
     log_odds: float
     model: str = ""
 
+    @property
+    def log_posterior(self) -> float:
+        """Log posterior of the best set, less what its model of the nuisance parameters needs."""
+        return self.explanation.best.log_posterior - self.log_odds
+
 
 def understand(
     stretches: Sequence[Stretch],
@@ -78,12 +84,25 @@ def understand(
     """
     progress = report or (lambda share, text: None)
     found = [_understood(stretches, explain(stretches, policy, report=lambda s, text: progress(0.6 * s, text)), policy)]
-    plain, derivatives = found[0].explanation, _Derivatives(stretches)
-    if plain.interrupted:
+    if found[0].explanation.interrupted:
         return found[0]
-    rough = _left_by_inexactness(plain)
     alternatives = [one for one in _models(stretches, policy) if models is None or one.name in models]
-    offered = [(_offers(stretches, plain, model, derivatives), model) for model in alternatives]
+    try:
+        _add_alternatives(found, stretches, alternatives, policy, progress)
+        best = _among(found)
+        return replace(best, explanation=exactly(best.explanation, policy))
+    except KeyboardInterrupt as stop:
+        best = _among(found)
+        return replace(best, explanation=replace(best.explanation, interrupted=what_ended(stop)))
+
+
+def _add_alternatives(
+    found: list[Understanding], stretches: Sequence[Stretch], models: Sequence[_Model], policy: Policy, progress: Report
+) -> None:
+    """Add to the explanation without them those under models of the nuisance parameters that are worth a search."""
+    plain, derivatives = found[0].explanation, _Derivatives(stretches)
+    rough = _left_by_inexactness(plain)
+    offered = [(_offers(stretches, plain, model, derivatives), model) for model in models]
     # The most promising first: what it finds leaves the others little to search for.
     for offers, model in sorted(offered, key=lambda pair: _most(pair[0]) - pair[1].odds, reverse=True):
         progress(0.6, model.name)
@@ -92,10 +111,17 @@ def understand(
         beside = [_offers(stretches, one, model, derivatives) for key, one in others.items() if key != plain.best.key]
         start = _start(stretches, [*offers, *chain(*beside)], _leader(found), odds, policy)
         if start is not None:
-            other = _understood(stretches, explain(stretches, policy, start=start), policy, odds, model.name)
+            explanation = explain(stretches, policy, start=start)
+            if explanation.interrupted:
+                raise KeyboardInterrupt(explanation.interrupted)
+            other = _understood(stretches, explanation, policy, odds, model.name)
             # What looked like a random walk beside some causes may be no such thing beside the best of that model.
             if other.walk is None or other.walk.is_likely(policy):
                 found.append(other)
+
+
+def _among(found: Sequence[Understanding]) -> Understanding:
+    """Return the most probable, with the best sets under the other models beside it."""
     best, elsewhere = _leader(found), []
     for other in found:
         if other is best:
@@ -103,12 +129,12 @@ def understand(
         fitted = other.explanation.best
         more = other.log_odds - best.log_odds
         elsewhere.append(replace(fitted, log_posterior=fitted.log_posterior - more))
-    return replace(best, explanation=replace(exactly(best.explanation, policy), elsewhere=tuple(elsewhere)))
+    return replace(best, explanation=replace(best.explanation, elsewhere=tuple(elsewhere)))
 
 
 def _leader(found: Sequence[Understanding]) -> Understanding:
     """Return the most probable, the prior of its model included."""
-    return max(found, key=lambda one: one.explanation.best.log_posterior - one.log_odds)
+    return max(found, key=lambda one: one.log_posterior)
 
 
 def _left_by_inexactness(plain: Explanation) -> float:
@@ -201,10 +227,13 @@ def _offers(stretches: Sequence[Stretch], known: Explanation, model: _Model, der
     """
     found: list[_Offer] = []
     for base in (known.best, known.nothing, *known.without.values()) if known.best.causes else (known.best,):
-        taken = derivatives.at(base.point)
-        point = model.admit(base.point, taken)
-        if point is not None:
-            found.append(_Offer(base.log_posterior + _promise(stretches, base.point, point, taken), point))
+        try:
+            taken = derivatives.at(base.point)
+            point = model.admit(base.point, taken)
+            if point is not None:
+                found.append(_Offer(base.log_posterior + _promise(stretches, base.point, point, taken), point))
+        except np.linalg.LinAlgError:  # a model whose equations have no solution offers nothing
+            continue
     return found
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.array.array import AccelerometerArray
 from gfimu.diagnosis.data.body.stretch import BodyStretch
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.linear import Point, linearise
@@ -15,8 +16,7 @@ from gfimu.diagnosis.fit.posterior import Posterior
 from gfimu.diagnosis.terms.cause import Cause, effects_of, mixing_of
 from gfimu.diagnosis.terms.columns import Columns
 from gfimu.diagnosis.terms.library import family_columns
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.world_model import EffectFamily, Whitened, prior_of, shapes_to_screen
+from gfimu.model.world_model import EffectFamily, Whitened, prior_of, shapes_to_screen
 
 __all__ = ["Hypothesis", "Screening", "Signature", "columns_of_run", "hypotheses_of", "screen"]
 
@@ -87,8 +87,8 @@ class Screening:
         return [response @ move for response in self.responses]
 
 
-def screen(stretches: Sequence[Stretch], point: Point, *, only: str = "") -> Screening:
-    """Linearise the whole library, or ``only`` one effect besides those of the point, about a point."""
+def screen(stretches: Sequence[Stretch], point: Point, *, only: Collection[str] | None = None) -> Screening:
+    """Linearise the whole library, or ``only`` some effects besides those of the point, about a point."""
     array, causes = stretches[0].model.array, point.causes
     runs = len({stretch.index for stretch in stretches})
 
@@ -118,7 +118,11 @@ def columns_of_run(signature: Signature, array: AccelerometerArray, run: int) ->
 
 
 def _plan(
-    stretches: Sequence[Stretch], posteriors: Sequence[Posterior], causes: Sequence[Cause], runs: int, only: str
+    stretches: Sequence[Stretch],
+    posteriors: Sequence[Posterior],
+    causes: Sequence[Cause],
+    runs: int,
+    only: Collection[str] | None,
 ) -> tuple[list[Signature], int]:
     """List the signatures to compute; returns them and the number of their columns."""
     model = stretches[0].model
@@ -135,7 +139,7 @@ def _plan(
         count = len(family.sizes(model.array))
         if (
             not count
-            or (only and name != only and name not in present)
+            or (only is not None and name not in only and name not in present)
             or (getattr(family, "needs_temperature", False) and not warm)
             or (still and family.place in _OF_MOTION)
         ):

@@ -35,7 +35,7 @@ class Sets:
         """Fit the causes and drives of points under the base's noise; a point that can't be fitted gives None."""
         new = {_key(point.causes): point for point in points if _key(point.causes) not in self.found}
         self.count += len(new)
-        self._keep(each_apart(self._roughly, list(new.values())))
+        each_apart(self._roughly, list(new.values()), keep=lambda one: self._keep([one]))
         # What remembers the drive for long is dear to fit closely: the leader of its kind alone.
         rough = [one for key in new if (one := self.found.get(key)) is not None and self._is_worth_it(one)]
         self._keep([self._closely(max(rough, key=_posterior))] if rough else [])

@@ -10,14 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.world_model import Effect, EffectFamily, Pattern
+from gfimu.array.array import AccelerometerArray
+from gfimu.model.world_model import Effect, EffectFamily, Pattern
 
 __all__ = ["ALIKE", "SMALLEST_POSITIVE", "Cause", "effects_of", "mixing_of"]
 
 ALIKE = 0.3
 """Numerical: shapes nearer than that, as a logarithm or in rad, belong to one optimum."""
 
+_AT_END = 1.0 - 1e-6  # numerical: share of a limit that is at it
 SMALLEST_POSITIVE = 1e-6
 """Numerical: least coordinate of what can't be negative."""
 
@@ -113,6 +114,20 @@ class Cause:
         with np.errstate(divide="ignore"):
             high = np.min(most[:, None] / np.abs(self.mixing), axis=0)
         return np.where((used & signed[:, None]).any(axis=0), SMALLEST_POSITIVE, -high), high
+
+    def at_limits(self, array: AccelerometerArray) -> list[str]:
+        """Return the parameters that stand at the end of their range, from where the data may pull them on."""
+        ends = [
+            size.key
+            for size, value in zip(self.family.sizes(array), self.sizes(array, 0), strict=True)
+            if abs(value) >= _AT_END * getattr(size, "most", np.inf)
+        ]
+        limits = getattr(self.family, "shape_limits", {})
+        for key in self.free_shape:
+            low, high = limits.get(key, (0.0, np.inf))
+            if not low < _AT_END * self.shape[key] or not self.shape[key] < _AT_END * high:
+                ends.append(key)
+        return ends
 
     def positive(self, array: AccelerometerArray) -> NDArray[np.bool_]:
         """Return which coordinates physics allows one sign only, shape (k,)."""

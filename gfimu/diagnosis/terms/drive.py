@@ -207,6 +207,7 @@ class Drive:
         window, widths = max(round(ROUGH_FOR / self.spline.spacing), 1), self.spline.widths
         known = uniform_filter1d(np.clip(1.0 - spread / self.roughness**2, 0.0, 1.0), window, mode="nearest")
         power = uniform_filter1d(self.spline.bend(self.coefficients) ** 2 * widths, window, mode="nearest") / widths
+        power = np.maximum(power, 0.0)  # a running sum of very unlike numbers may round below zero
         return replace(self, roughness=np.sqrt(power / np.maximum(known, _LEAST_KNOWN) + LEAST_ROUGHNESS**2))
 
     def by_reference(

@@ -8,11 +8,11 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.diagnosis.data.stretch import Stretch
+from gfimu.diagnosis.data.stretch import NoPredictionError, Stretch
 from gfimu.diagnosis.terms.cause import Cause, effects_of
 from gfimu.diagnosis.terms.columns import Columns
 from gfimu.diagnosis.terms.reach import behind_wiring, disjoint
-from gfimu.world_model import Effect, EffectFamily
+from gfimu.model.world_model import Effect, EffectFamily
 
 __all__ = ["Nuisance", "Seen", "cause_columns", "family_columns"]
 
@@ -119,7 +119,10 @@ def _differences(
     places: list[list[int]] = [[] for _ in range(base.shape[1])]
     parts: list[list[NDArray[np.float64]]] = [[] for _ in range(base.shape[1])]
     for group in disjoint(reach, count):
-        change = (stretch.predict(changed(group), spin) - base) * weight
+        try:
+            change = (stretch.predict(changed(group), spin) - base) * weight
+        except NoPredictionError:  # an unknown that can't be moved explains nothing here
+            continue
         there = change.any(axis=0)
         for unknown in group:
             reached = there if reach is None else there & np.append(reach[unknown], False)

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.world_model import Effect
+from gfimu.array.array import AccelerometerArray
+from gfimu.model.world_model import Effect
 
 __all__ = ["behind_wiring", "disjoint"]
 

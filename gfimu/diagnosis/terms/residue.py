@@ -11,14 +11,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gfimu.array.array import AccelerometerArray
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.terms.cause import Cause
 from gfimu.diagnosis.terms.columns import Columns
 from gfimu.diagnosis.terms.drive import Drive
 from gfimu.diagnosis.terms.library import family_columns
 from gfimu.diagnosis.terms.observed import Observed
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.world_model import Effect, EffectFamily
+from gfimu.model.world_model import Effect, EffectFamily
 
 __all__ = ["Residue"]
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import solveh_banded
 
 from gfimu.diagnosis.data.table.spins import State
-from gfimu.world_model import Spin, SpinState
+from gfimu.model.world_model import Spin, SpinState
 
 __all__ = ["DEGREE", "AngleSpline", "PushedSpin", "SplineSpin"]
 

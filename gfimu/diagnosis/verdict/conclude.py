@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import expit
 
+from gfimu.array.array import AccelerometerArray
 from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.criticism.lack_of_fit import LackOfFit
 from gfimu.diagnosis.criticism.slow_noise import LoudestChannel, loudest_channel, white_factor
@@ -36,15 +37,15 @@ from gfimu.diagnosis.verdict.naming import (
     probabilities,
     rival_list,
 )
-from gfimu.diagnosis.verdict.parts import NamedCause, Residual, Unexplained
+from gfimu.diagnosis.verdict.parts import NamedCause, NoiseLevels, Residual, Unexplained
 from gfimu.diagnosis.verdict.undetermined import undetermined, undetermined_sentence
 from gfimu.diagnosis.verdict.verdict import Diagnosis
 from gfimu.diagnosis.verdict.wording import Notes, verdict_sentences
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.world_model import Effect, WorldModel, is_of_one_recording
+from gfimu.model.world_model import Effect, WorldModel, is_of_one_recording
 
 __all__ = ["Described", "conclude", "is_dominant", "is_unknown", "named_causes"]
 
+_OF_NOISE = frozenset({"noise", "bias_random_walk"})
 _TURNS = ("direction_rad", "phase_rad")  # compared on the circle: a relative error means nothing
 
 
@@ -222,8 +223,8 @@ def conclude(
     model, array = first.model, first.model.array
     found = [
         *fault_causes((effect for effects in prepared.effects for effect in effects), prepared.why, policy),
-        # What has no name may look like a random walk: beside it none is claimed.
-        *_noise_causes(None if unknown else understanding.walk, understanding, policy),
+        # What has no name may look like noise, or a random walk: beside it none is claimed.
+        *([] if unknown else _noise_causes(understanding.walk, understanding, policy)),
     ]
     rivals = conflicting(explanation, policy)
     named = named_causes(explanation, explanation.best, policy, left)
@@ -231,17 +232,21 @@ def conclude(
     loudest = loudest_channel(explanation.stretches, believed.point, policy)
     apart = stands_out(explanation, left, policy)
     runs = run_views(prepared, explanation.stretches, believed)
-    if unknown:
-        verdict, causes = "unknown", tuple(found)
+    levels = believed.point.levels[0]
+    floor = body_noise_floor(first, levels) if isinstance(first, BodyStretch) else _noise_floor(runs, first, believed)
+    residual = Residual.of_views(runs, array.channels, floor)
+    if unknown or (not named and loudest.stands_out(policy)):
+        verdict, causes = "unknown", tuple(one for one in found if one.effect not in _OF_NOISE)
     elif rivals:
         verdict = "ambiguous"
         others = {c.effect: c for rival in reversed(rivals) for c in named_causes(explanation, rival, policy)}
         every = [*named, *(other for name, other in others.items() if name not in explanation.best.names)]
-        causes = (*found, *contested(every, [explanation.best, *rivals], model.families()))
+        verdict_causes = contested(every, [explanation.best, *rivals], model.families())
+        causes = _by_contribution(found, verdict_causes, residual, levels)
     elif named or found:
-        verdict, causes = "explained", (*found, *named)
+        verdict, causes = "explained", _by_contribution(found, named, residual, levels)
     else:
-        verdict, causes = "unknown" if loudest.stands_out(policy) else "nothing_found", ()
+        verdict, causes = "nothing_found", ()
     shown = left.signature if (unknown and not refuted) or apart else ""
     unexplained = Unexplained(
         unknown or apart or loudest.stands_out(policy),
@@ -251,23 +256,20 @@ def conclude(
         described is not None and described.carried is not None,
         0 if described is None else described.left_out,
     )
-    levels = believed.point.levels[0]
-    floor = body_noise_floor(first, levels) if isinstance(first, BodyStretch) else _noise_floor(runs, first, believed)
-    residual = Residual.of_views(runs, array.channels, floor)
     extension, of_time = _extension(believed, described, array, unknown=unknown, confirmed=gain.of_other_recording)
     twin = model.extended([*_library_effects(model, found), *_residue(explanation), *extension])
     expected = model.expected_noise(first.run.output_data_rate)
-    noise: dict[str, Any] = {
-        "white_over_data_sheet": float(np.median(levels.white[:-1] / expected.white)),
-        "bias_instability_m_s2": float(np.median(levels.flicker[:-1])),
-        "bias_instability_largest_m_s2": loudest.level,
-        "bias_instability_largest_channel": loudest.name,
-        "reference_white": float(levels.white[-1]),
-        "calibration_residue": understanding.residue,
-    }
-    if isinstance(first, BodyStretch):
-        noise |= {"disagreement_s": levels.agitation, "gyro_bias_rad_s": float(np.linalg.norm(first.run.gyro_bias))}
-        del noise["reference_white"]
+    body = first.run if isinstance(first, BodyStretch) else None
+    noise = NoiseLevels(
+        white_over_data_sheet=float(np.median(levels.white[:-1] / expected.white)),
+        bias_instability_m_s2=float(np.median(levels.flicker[:-1])),
+        bias_instability_largest_m_s2=loudest.level,
+        bias_instability_largest_channel=loudest.name,
+        reference_white=float(levels.white[-1]) if body is None else None,
+        calibration_residue=understanding.residue,
+        disagreement_s=None if body is None else levels.agitation,
+        gyro_bias_rad_s=None if body is None else float(np.linalg.norm(body.gyro_bias)),
+    )
     notes = Notes(
         residue=understanding.residue,
         unreferenced=sum(run.unreferenced for run in prepared.runs),
@@ -279,12 +281,38 @@ def conclude(
     weaker = rival_list(explanation, policy)
     # Of a table those of the causes alone: it could have many others, each with something that it does not show.
     looked_at = None if policy.free_body else {cause.effect for cause in causes}
-    open_ones = undetermined(explanation.screening, array, policy.least_share, looked_at)
+    screening = explanation.screening
+    open_ones = () if screening is None else undetermined(screening, array, policy.least_share, looked_at)
     words = (*words, undetermined_sentence(open_ones)) if open_ones else words
     if of_time:
         words = (*words, _of_absolute_time(of_time))
-    listed = tuple(one.to_dict() for one in open_ones)
-    return Diagnosis(verdict, causes, residual, gain, unexplained, weaker, twin, runs, words, noise, listed)
+    return Diagnosis(
+        verdict=verdict,
+        causes=causes,
+        residual=residual,
+        gain=gain,
+        unexplained=unexplained,
+        rivals=weaker,
+        twin=twin,
+        runs=runs,
+        sentences=words,
+        noise=noise,
+        undetermined=open_ones,
+    )
+
+
+def _by_contribution(
+    faults: Sequence[NamedCause], inferred: Sequence[NamedCause], residual: Residual, levels: Any
+) -> tuple[NamedCause, ...]:
+    """Return faults of the samples before what was inferred, but after it those that change less than it explains."""
+    explained = np.sqrt(max(residual.rms_before**2 - residual.rms_after**2, 0.0)) if inferred else 0.0
+    white = float(np.median(levels.white[:-1]))
+    sizes = {
+        "coarse_resolution": lambda one: one["step_m_s2"] / np.sqrt(12.0),
+        "noise": lambda one: white * np.sqrt(max(1.0 - one["factor"] ** -2, 0.0)),
+    }
+    small = [one for one in faults if one.effect in sizes and float(sizes[one.effect](one.parameters)) < explained]
+    return (*(one for one in faults if one not in small), *inferred, *small)
 
 
 def _believed(explanation: Explanation, described: Described | None, *, unknown: bool) -> Fit:

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gfimu.array.array import AccelerometerArray
 from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.verdict.parts import NamedCause, Residual
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.world_model import EffectFamily, bound_of
+from gfimu.diagnosis.verdict.parts import NamedCause, Residual, Unexplained
+from gfimu.model.world_model import EffectFamily, bound_of
 
 __all__ = ["NOT_THIS_UNIT", "Judgement", "impossible_sizes", "judge", "measurable"]
 
@@ -38,11 +38,18 @@ class Judgement:
     why: str = ""
 
 
-def judge(gain: Gain, residual: Residual, causes: Sequence[NamedCause], policy: Policy = Policy()) -> Judgement:
+def judge(
+    gain: Gain,
+    residual: Residual,
+    causes: Sequence[NamedCause],
+    policy: Policy = Policy(),
+    unexplained: Unexplained = Unexplained(),
+) -> Judgement:
     """Judge causes by what they are worth on held-out data and on the fitted data.
 
     They are withdrawn where they predict held-out data worse than the given simulation, remove less than half of the
-    excess there, or make the error on the fitted data worse, each beyond its standard error.
+    excess there, or make the error on the fitted data worse, each beyond its standard error; and where something that
+    no cause explains is as large as what they explain.
 
     Parameters
     ----------
@@ -54,6 +61,8 @@ def judge(gain: Gain, residual: Residual, causes: Sequence[NamedCause], policy: 
         The causes, for the words.
     policy : Policy
         Thresholds.
+    unexplained : Unexplained
+        What they leave.
     """
     if not causes:
         return Judgement()
@@ -64,6 +73,8 @@ def judge(gain: Gain, residual: Residual, causes: Sequence[NamedCause], policy: 
     if after > max((1.0 + policy.noise_accuracy) * before, (1.0 + policy.small) * residual.noise_floor):
         worse = f"the prediction error rises from {before:.3g} to {after:.3g} m/s²"
         return Judgement(True, f"{_found(causes)} make the simulation worse: {worse}")
+    if unexplained.significant and not residual.is_noise and residual.share_left > policy.least_share:
+        return Judgement(True, f"{_found(causes)} leave {residual.left_in_words}: {unexplained.signature}")
     return Judgement()
 
 
@@ -102,7 +113,7 @@ def impossible_sizes(
     """Return a signature where a cause is larger than its part or rig can be off; empty where none is.
 
     Such a size says that the twin describes another unit: its array file, its axes or its units are wrong. The bound
-    is that of the effect's class (`gfimu.world_model.bound_of`); faults of the wiring have none.
+    is that of the effect's class (`gfimu.model.world_model.bound_of`); faults of the wiring have none.
 
     Parameters
     ----------

@@ -58,14 +58,13 @@ class LibraryRule:
     Parameters
     ----------
     constant, coincidence, size, unexplained : float
-        Coefficients. Set on 142 causes that were named in worlds inside the library (the gate of `sim.study`, with one
-        effect taken out of it in some) and in foreign ones (``tests/foreign_study.py``); 11 of these names were wrong.
+        Coefficients. Set on 142 causes that were named in worlds inside the library (the gate of `sim.trials.study`,
+        with one effect taken out of it in some) and in foreign ones (``tests/foreign_study.py``); 11 of these names
+        were wrong.
     most : float
         Largest probability without another recording.
     nats, stds : tuple of (float, float)
         Where c and z are clipped: what is beyond says no more.
-    enough : float
-        Probability from which the wider library is not searched. By choice.
     """
 
     constant: float = 1.19
@@ -75,7 +74,6 @@ class LibraryRule:
     most: float = 0.97
     nats: tuple[float, float] = (0.0, 20.0)
     stds: tuple[float, float] = (0.3, 100.0)
-    enough: float = 0.8
 
 
 def standing_out(cause: NamedCause, shape: Collection[str]) -> float:
@@ -151,8 +149,8 @@ def with_library(
 
 
 def with_wider_library(found: Diagnosis) -> Diagnosis:
-    """Return a verdict by the wider library, after the usual one gave no good answer; its twin has the usual one."""
-    words = (*found.sentences, "The usual effects did not explain the data: further ones were searched, too.")
+    """Return a verdict by the wider library, which explains the data better; its twin has the usual one."""
+    words = (*found.sentences, "The usual effects explain the data less well: further ones were searched, too.")
     return replace(found, twin=found.twin.searching(wide=False), sentences=words)
 
 

@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.files.model_files import list_models
 from gfimu.diagnosis.data.plausibility import NOISE, REMOVED
 from gfimu.diagnosis.data.run import Run
-from gfimu.files.model_files import list_models
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.world_model import WorldModel
+from gfimu.model.world_model import WorldModel
 
 __all__ = ["LikelyMistake", "likely_mistake"]
 
@@ -72,6 +72,7 @@ def likely_mistake(model: WorldModel, runs: Sequence[Run], predict: Predict) -> 
     for text, array in _other_arrays(model.array):
         other = model.with_array(array)
         options.append((text, _Misfit.of(runs, [predict(other, run) for run in runs], white)))
+    options += _placed_otherwise(model, runs, predict, predictions, white)
     options += _read_otherwise(model.array, runs, predictions, white)
     least = min(misfit.squares for _, misfit in options)
     if least > (1.0 - REMOVED) * before.squares:
@@ -94,6 +95,39 @@ class _Misfit:
             [np.where(run.valid, run.readings - one, 0.0) for run, one in zip(runs, predictions, strict=True)]
         )
         return cls(float(np.mean((error / white) ** 2)), float(np.sqrt(np.mean(error**2))))
+
+
+def _placed_otherwise(
+    model: WorldModel,
+    runs: Sequence[Run],
+    predict: Predict,
+    predictions: Sequence[NDArray[np.float64]],
+    white: NDArray[np.float64],
+) -> Iterator[tuple[str, _Misfit]]:
+    """Yield for each chip the place from which it reads best: a reading is linear in its chip's place."""
+    array = model.array
+    positions, axes = array.chip_positions, [chip.axes for chip in array.chips]
+    base = np.concatenate(predictions)
+    slopes = []
+    for direction in array.length_unit * np.eye(3):
+        moved = model.with_array(array.with_geometry(positions + direction, axes))
+        slopes.append(np.concatenate([predict(moved, run) for run in runs]) - base)  # (n, c)
+    valid = np.concatenate([run.valid for run in runs])
+    error = np.where(valid, np.concatenate([run.readings for run in runs]) - base, 0.0) / white
+    starts = np.cumsum([len(one) for one in predictions])[:-1]
+    for number, chip in enumerate(array.chips):
+        mine = array.chip_of_channel == number
+        design = np.stack([np.where(valid, slope / white, 0.0)[:, mine].ravel() for slope in slopes], axis=1)
+        step = np.linalg.lstsq(design, error[:, mine].ravel(), rcond=1e-6)[0]  # numerical: an axis shows no height
+        change = sum(part * slope for part, slope in zip(step, slopes, strict=True))
+        place = positions[number] + array.length_unit * step
+        placed = np.split(base + np.where(mine, change, 0.0), starts)
+        text = f"chip {chip.name} reads as if at {_in_metres(place)}, not at {_in_metres(positions[number])}"
+        yield text, _Misfit.of(runs, placed, white)
+
+
+def _in_metres(place: NDArray[np.float64]) -> str:
+    return f"({', '.join(f'{part + 0.0:.3f}' for part in np.round(place, 3))}) m"
 
 
 def _read_otherwise(

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from scipy.special import softmax
 from scipy.stats import chi2
 
+from gfimu.array.array import AccelerometerArray
 from gfimu.diagnosis.fit.gauss_newton import Fit
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.explain import Explanation
 from gfimu.diagnosis.terms.cause import Cause
-from gfimu.diagnosis.verdict.parts import NamedCause, Rival
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.world_model import Effect, EffectFamily, dependence_of
+from gfimu.diagnosis.verdict.parts import NamedCause, Rival, Unlisted
+from gfimu.model.world_model import Effect, EffectFamily, dependence_of
 
 __all__ = [
     "capped",
@@ -77,6 +77,8 @@ def mimics(explanation: Explanation, cause: Cause, policy: Policy) -> list[str]:
     the distinguishability D of Eriksson, Frisk and Krysander, Automatica 49, 2013).
     """
     screening = explanation.screening
+    if screening is None:
+        return []
     mine = next((one for one in screening.signatures if one.family.name == cause.name), None)
     if mine is None:
         return []
@@ -116,7 +118,9 @@ def rival_list(explanation: Explanation, policy: Policy) -> tuple[Rival, ...]:
     for one in [*explanation.rivals[: policy.beam], *([explanation.nothing] if best.causes else [])]:
         odds, worse = one.log_posterior - best.log_posterior, one.objective - best.objective
         more = sum(len(c.coordinates) for c in one.causes) - sum(len(c.coordinates) for c in best.causes)
-        if not one.causes:
+        if odds > 0.0:
+            why = f"it is more probable, but its further causes bring less than a cause must (χ² {worse:+.0f})"
+        elif not one.causes:
             why = f"without any cause the misfit is larger by {worse:.0f} (χ²)"
         elif worse > 2.0 * abs(odds):
             why = f"it fits worse: χ² is larger by {worse:.0f}"
@@ -175,11 +179,15 @@ def name_cause(
         + _at_most(explanation, fit, cause)
         + _or_other_nuisances(explanation, cause, policy)
     )
+    probability, ends = likely.get(cause.name, 0.0), cause.at_limits(array)
+    if ends:
+        probability = min(probability, 1.0 - policy.small)
+        why += f"; {' and '.join(ends)} stands at the end of its range, so that its size is not known"
     named = NamedCause(
         cause.name,
         parameters,
         std,
-        likely.get(cause.name, 0.0),
+        probability,
         cause.place,
         tuple(same),
         str(cause.family.separated_by) if same else "",
@@ -190,13 +198,13 @@ def name_cause(
     return capped(named, policy, cause.shape)
 
 
-def _unlisted(cause: Cause) -> dict[str, str]:
-    """Return place, dependence and pattern of a cause that the contract has no name for; nothing of others."""
+def _unlisted(cause: Cause) -> Unlisted | None:
+    """Return place, dependence and pattern of a cause that the contract has no name for; None of others."""
     dependence = dependence_of(cause.family)
     if dependence is None:
-        return {}
+        return None
     place = str(getattr(cause.family, "grammar_place", cause.family.place))
-    return {"place": place, "dependence": dependence.name, "pattern": cause.place or "one"}
+    return Unlisted(cause.name, place, dependence.name, cause.place or "one")
 
 
 def _at_most(explanation: Explanation, fit: Fit, cause: Cause) -> str:

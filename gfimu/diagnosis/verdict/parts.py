@@ -3,43 +3,57 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
-from typing import Any
+from dataclasses import dataclass, field
+from typing import Annotated, Any
 
 import numpy as np
 
+from gfimu.base.declared import Declared, figure
+from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.criticism.views.run_view import RunView
+from gfimu.diagnosis.policy import Policy
 
-__all__ = ["NamedCause", "Residual", "Rival", "Unexplained"]
+__all__ = [
+    "Interrupted",
+    "NamedCause",
+    "NoiseLevels",
+    "ReferenceClock",
+    "Residual",
+    "Rival",
+    "Unexplained",
+    "Unlisted",
+    "is_in_part",
+]
+
+
+class Parameter(Declared):
+    """A parameter of a cause as JSON holds it; its unit is in its key."""
+
+    value: Annotated[Any, figure("Its value: a number, or a name or list of names.")]
+    std: Annotated[float | None, figure("Of a number: its standard deviation; null where none is known.", absent=True)]
 
 
 @dataclass(frozen=True)
-class NamedCause:
+class Unlisted(Declared):
+    """What is known of a cause that the contract has no name for."""
+
+    name: Annotated[str, figure("Of an unlisted one: its terms.")]
+    place: Annotated[str, figure("Where in the chain it acts.")]
+    dependence: Annotated[str, figure("Of an unlisted one: function of the motion.")]
+    pattern: Annotated[str, figure("Of an unlisted one: how it is spread over the channels.")]
+
+    @property
+    def effect(self) -> Annotated[str, figure("The word for all of them.")]:
+        """The word that stands for its effect."""
+        return "unlisted"
+
+
+@dataclass(frozen=True)
+class NamedCause(Declared):
     """One cause in a verdict: an effect with its sizes, their standard deviations and a probability.
 
-    Parameters
-    ----------
-    effect : str
-        Contract name.
-    parameters : mapping
-        Values by contract key (numbers, names or lists of names).
-    std : mapping
-        Standard deviations of those that are estimated.
-    probability : float
-        Probability that this effect is among the causes.
-    place : str
-        Where it acts (``"chip a2"``), empty where it has only one place.
-    not_distinguishable_from : tuple of str
-        Effects that explain these data as well.
-    would_be_separated_by : str
-        Excitation that would separate them.
-    why : str
-        One sentence: where and how it shows.
-    log_odds : float
-        Log odds of the explanation with this cause against the best one without it.
-    unlisted : mapping of str to str
-        Of an effect that the contract has no name for: its ``place`` in the chain, the ``dependence`` on the motion and
-        the ``pattern`` of its sizes. Empty for all others.
+    ``parameters`` are the values by contract key (numbers, names or lists of names), and ``std`` the standard
+    deviations of those that are estimated.
 
     Examples
     --------
@@ -48,72 +62,56 @@ class NamedCause:
     >>> cause.parameters, cause.std  # doctest: +SKIP
     """
 
-    effect: str
+    effect: Annotated[str, figure("The effect; unlisted for one without a name.")]
     parameters: Mapping[str, Any]
     std: Mapping[str, float]
-    probability: float
-    place: str = ""
-    not_distinguishable_from: tuple[str, ...] = ()
-    would_be_separated_by: str = ""
-    why: str = ""
-    log_odds: float = 0.0
-    unlisted: Mapping[str, str] = field(default_factory=dict)
+    probability: Annotated[float, figure("Probability that this effect is among the causes.")]
+    place: Annotated[str, figure("Where it acts, such as chip a2; empty where it has only one place.")] = ""
+    not_distinguishable_from: Annotated[tuple[str, ...], figure("Effects that explain these data as well.")] = ()
+    would_be_separated_by: Annotated[str, figure("Excitation that would separate them.")] = ""
+    why: Annotated[str, figure("Where and how it shows, one sentence.")] = ""
+    log_odds: Annotated[float, figure("Log odds against the best explanation without it.", "nats")] = 0.0
+    unlisted: Annotated[
+        Unlisted | None, figure("Of an effect that the contract has no name for.", flat=True, absent=True)
+    ] = None
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON form of the contract."""
-        parameters = {
+    @property
+    def sizes(
+        self,
+    ) -> Annotated[
+        dict[str, Any],
+        figure("Parameters; units in the keys.", key="parameters", before="probability", json=dict[str, Parameter]),
+    ]:
+        """Values and standard deviations by contract key, as JSON holds them."""
+        return {
             key: {"value": value, "std": self.std.get(key)} if isinstance(value, int | float) else {"value": value}
             for key, value in self.parameters.items()
         }
-        return {
-            "effect": self.effect,
-            "parameters": parameters,
-            "probability": self.probability,
-            "place": self.place,
-            "not_distinguishable_from": list(self.not_distinguishable_from),
-            "would_be_separated_by": self.would_be_separated_by,
-            "why": self.why,
-            "log_odds": self.log_odds,
-            **({"effect": "unlisted", "name": self.effect, **self.unlisted} if self.unlisted else {}),
-        }
 
 
 @dataclass(frozen=True)
-class Rival:
-    """Another explanation and why it lost.
+class Rival(Declared):
+    """Another explanation and why it lost."""
 
-    Parameters
-    ----------
-    effects : tuple of str
-        Its effects.
-    log_odds : float
-        Log odds against the verdict (negative: less probable).
-    why : str
-        One sentence.
-    """
-
-    effects: tuple[str, ...]
-    log_odds: float
-    why: str = ""
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON form of the contract."""
-        return {"effects": list(self.effects), "log_odds": self.log_odds, "why": self.why}
+    effects: Annotated[tuple[str, ...], figure("Its effects.")]
+    log_odds: Annotated[float, figure("Log odds against the verdict; negative: less probable.", "nats")]
+    why: Annotated[str, figure("Why it lost, one sentence.")] = ""
 
 
 @dataclass(frozen=True)
-class Residual:
-    """Size of the residual before and after, m/s², over valid samples of all channels.
+class Residual(Declared):
+    """Prediction error over all valid samples of all channels, before and after."""
 
-    ``before_by_channel`` and ``after_by_channel`` hold it per channel; ``noise_floor`` is the rms of the noise as
-    estimated from the data.
-    """
+    rms_before: Annotated[float, figure("Of the twin as given.", "m/s²")]
+    rms_after: Annotated[float, figure("Of the extended twin.", "m/s²")]
+    noise_floor: Annotated[float, figure("Noise as estimated from the data.", "m/s²")]
+    before_by_channel: Annotated[Mapping[str, float], figure("Of the twin as given, by channel.", "m/s²")]
+    after_by_channel: Annotated[Mapping[str, float], figure("Of the extended twin, by channel.", "m/s²")]
 
-    rms_before: float
-    rms_after: float
-    noise_floor: float
-    before_by_channel: Mapping[str, float]
-    after_by_channel: Mapping[str, float]
+    @property
+    def unit(self) -> Annotated[str, figure("Unit of all of these.", before="before_by_channel")]:
+        """Unit of all of these, as keys write it."""
+        return "m/s2"
 
     @classmethod
     def of_views(cls, views: Sequence[RunView], channels: Sequence[str], noise_floor: float) -> Residual:
@@ -131,48 +129,101 @@ class Residual:
             dict(zip(channels, map(float, np.sqrt(after / count)), strict=True)),
         )
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON form of the contract."""
-        return {
-            "rms_before": self.rms_before,
-            "rms_after": self.rms_after,
-            "noise_floor": self.noise_floor,
-            "unit": "m/s2",
-            "before_by_channel": dict(self.before_by_channel),
-            "after_by_channel": dict(self.after_by_channel),
-        }
+    @property
+    def share_left(self) -> float:
+        """Share of the squared error beyond noise that remains on the fitted data, 0 to 1; 0 where there was none."""
+        before, after = (max(rms**2 - self.noise_floor**2, 0.0) for rms in (self.rms_before, self.rms_after))
+        return min(after / before, 1.0) if before else 0.0
+
+    @property
+    def is_noise(self) -> bool:
+        """Whether hardly more than noise remains on the fitted data."""
+        return self.rms_after <= (1.0 + Policy.small) * self.noise_floor
+
+    @property
+    def left_in_words(self) -> str:
+        """How much of the error remains, for people."""
+        return "hardly more than noise" if self.is_noise else f"{100 * self.share_left:.2g} % of the error beyond noise"
 
 
 @dataclass(frozen=True)
-class Unexplained:
-    """What is left and nothing in the library explains.
+class Unexplained(Declared):
+    """What is left and nothing in the library explains."""
 
-    Parameters
-    ----------
-    significant : bool
-        Whether it is more than chance.
-    signature : str
-        Which channels, which dependence, in words.
-    log_odds : float
-        Log odds of the strongest term against chance.
-    surrogate : mapping of str to float
-        Data-driven terms: coefficients by what they are of, with its unit, and function: ``"a11_m_s2: rate²"``.
-    extends_twin : bool
-        Whether such terms are in the extended twin, as they predict validation data.
-    left_out : int
-        How many of the terms are not in it, as they are of absolute time, which another recording has otherwise.
-    mistake : str
-        A mistake in the files that makes the simulation fit; empty where none does.
+    significant: Annotated[bool, figure("Whether it is more than chance.")] = False
+    signature: Annotated[str, figure("Which channels and which dependence, in words.")] = ""
+    log_odds: Annotated[float, figure("Log odds of the strongest term against chance.", "nats")] = 0.0
+    surrogate: Annotated[
+        Mapping[str, float],
+        figure("Coefficients of data-driven terms, such as a11_m_s2: rate²; units in the keys."),
+    ] = field(default_factory=dict)
+    extends_twin: Annotated[
+        bool, figure("Whether these terms are in the extended twin, as they predict validation data.")
+    ] = False
+    left_out: Annotated[
+        int,
+        figure("Terms that are not in it, as they are of absolute time, which another recording has otherwise."),
+    ] = 0
+    mistake: Annotated[str, figure("A mistake in the files that makes the simulation fit; empty where none does.")] = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class NoiseLevels(Declared):
+    """Noise levels that were estimated; None where the recording has no such level.
+
+    The disagreement and the gyro are those of a free body. The noise of the reference of a stage is in m/s. The
+    calibration residue, 0 where there is none, is of all the twin's numbers at once.
     """
 
-    significant: bool = False
-    signature: str = ""
-    log_odds: float = 0.0
-    surrogate: Mapping[str, float] = field(default_factory=dict)
-    extends_twin: bool = False
-    left_out: int = 0
-    mistake: str = ""
+    white_over_data_sheet: Annotated[
+        float | None, figure("White noise of the channels over that of the data sheet (median).", absent=True)
+    ] = None
+    bias_instability_m_s2: Annotated[
+        float | None, figure("Bias instability (median of the channels).", "m/s²", absent=True)
+    ] = None
+    bias_instability_largest_m_s2: Annotated[float | None, figure("Largest bias instability.", "m/s²", absent=True)] = (
+        None
+    )
+    bias_instability_largest_channel: Annotated[
+        str | None, figure("Channel of the largest bias instability.", absent=True)
+    ] = None
+    reference_white: Annotated[float | None, figure("White noise of the reference.", "rad/s", absent=True)] = None
+    calibration_residue: Annotated[
+        float | None,
+        figure(
+            "Size of the small corrections (calibration residue) in units of what a good calibration leaves.",
+            absent=True,
+        ),
+    ] = None
+    disagreement_s: Annotated[
+        float | None,
+        figure("Disagreement of the channels over the rate of change of their readings.", "s", absent=True),
+    ] = None
+    gyro_bias_rad_s: Annotated[float | None, figure("Bias of the gyro.", "rad/s", absent=True)] = None
+    time_jitter_s: Annotated[float | None, figure("Jitter of the sample times.", "s", absent=True)] = None
+    impossible_values: Annotated[float | None, figure("Values that can't be a measurement.", absent=True)] = None
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON form of the contract."""
-        return {**asdict(self), "surrogate": dict(self.surrogate)}
+
+@dataclass(frozen=True)
+class ReferenceClock(Declared):
+    """Clock of a reference that was aligned before the diagnosis."""
+
+    offset_s: Annotated[float, figure("Channels' clock less the reference's at the first sample.", "s")]
+    offset_std_s: Annotated[float, figure("Its standard deviation.", "s")]
+    rate_error: Annotated[float, figure("Seconds of the channels' clock per second of the reference's, less one.")]
+    rate_error_std: Annotated[float, figure("Its standard deviation.")]
+
+
+@dataclass(frozen=True)
+class Interrupted(Declared):
+    """What ended a diagnosis before it was done."""
+
+    by: Annotated[str, figure("time limit, Ctrl-C or SIGTERM.")]
+    stage: Annotated[str, figure("The stage that was going on.")]
+    done: Annotated[tuple[str, ...], figure("Stages that were done.")]
+    not_done: Annotated[tuple[str, ...], figure("Stages that were not.")]
+
+
+def is_in_part(verdict: str, gain: Gain, unexplained: Unexplained) -> bool:
+    """Whether causes explain a part only: they leave a tenth of the held-out excess, or what is no chance."""
+    return verdict == "explained" and (unexplained.significant or gain.share_of_excess_removed < 1.0 - Policy.small)

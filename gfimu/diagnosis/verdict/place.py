@@ -13,7 +13,7 @@ from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.verdict.gate import NOT_THIS_UNIT
 from gfimu.diagnosis.verdict.likely_mistakes import likely_mistake
 from gfimu.diagnosis.verdict.verdict import Diagnosis
-from gfimu.world_model import is_linear
+from gfimu.model.world_model import is_linear
 
 __all__ = ["with_place"]
 

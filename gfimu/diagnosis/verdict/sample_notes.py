@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from gfimu.diagnosis.data.run import Run
 from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.verdict.parts import NamedCause
+from gfimu.diagnosis.verdict.parts import NamedCause, ReferenceClock
 from gfimu.diagnosis.verdict.verdict import Diagnosis
-from gfimu.world_model import WorldModel
+from gfimu.model.world_model import WorldModel
 
 __all__ = ["with_reference_clock", "with_sample_notes"]
 
@@ -20,15 +20,15 @@ def with_sample_notes(diagnosis: Diagnosis, runs: Sequence[Run]) -> Diagnosis:
     """Return a diagnosis that reports the jitter of the time stamps and the values left out, where there are any."""
     jitter = max(run.jitter for run in runs)
     impossible = sum(run.impossible for run in runs)
-    sentences, noise = list(diagnosis.sentences), dict(diagnosis.noise)
+    sentences, noise = list(diagnosis.sentences), diagnosis.noise
     if jitter > 0.0:
-        noise["time_jitter_s"] = jitter
+        noise = replace(noise, time_jitter_s=jitter)
         sentences.append(
             f"The time stamps scatter by {1e3 * jitter:.2g} ms rms about a uniform grid; the samples are taken as "
             "uniform."
         )
     if impossible:
-        noise["impossible_values"] = float(impossible)
+        noise = replace(noise, impossible_values=float(impossible))
         values = "value is" if impossible == 1 else "values are"
         sentences.append(f"{impossible} {values} left out as corrupt: no sensor of this part reads that much.")
     return replace(diagnosis, sentences=tuple(sentences), noise=noise)
@@ -36,7 +36,7 @@ def with_sample_notes(diagnosis: Diagnosis, runs: Sequence[Run]) -> Diagnosis:
 
 def with_reference_clock(
     diagnosis: Diagnosis,
-    clock: Mapping[str, float],
+    clock: ReferenceClock,
     corrected: Sequence[str],
     given: WorldModel,
     policy: Policy = Policy(),
@@ -50,7 +50,7 @@ def with_reference_clock(
     ----------
     diagnosis : Diagnosis
         Of the aligned recording.
-    clock : mapping
+    clock : ReferenceClock
         `Diagnosis.reference_clock`.
     corrected : sequence of str
         What the alignment took off the recording and therefore is no part of the extended twin: ``tacho_latency``,
@@ -61,8 +61,8 @@ def with_reference_clock(
         Thresholds ``most_certain`` and ``noise_stds``.
     """
     sizes = {
-        "tacho_latency": ("delay_s", -clock["offset_s"], clock["offset_std_s"]),
-        "clock_error": ("ratio", clock["rate_error"], clock["rate_error_std"]),
+        "tacho_latency": ("delay_s", -clock.offset_s, clock.offset_std_s),
+        "clock_error": ("ratio", clock.rate_error, clock.rate_error_std),
     }
     why = "shown by the correlation of ω² and α with the channels; taken off before the rest was diagnosed"
     causes = [
@@ -70,11 +70,11 @@ def with_reference_clock(
         for name, (key, value, std) in sizes.items()
         if name in corrected
     ]
-    offset, rate = clock["offset_s"], clock["rate_error"]
+    offset, rate = clock.offset_s, clock.rate_error
     text = (
-        f"By the alignment of the two the channels' clock was {abs(offset):.4g} ± {clock['offset_std_s']:.2g} s "
+        f"By the alignment of the two the channels' clock was {abs(offset):.4g} ± {clock.offset_std_s:.2g} s "
         f"{'ahead of' if offset >= 0.0 else 'behind'} the reference's at the first sample and is {1e2 * abs(rate):.3g} "
-        f"± {1e2 * clock['rate_error_std']:.2g} % {'fast' if rate >= 0.0 else 'slow'} against it."
+        f"± {1e2 * clock.rate_error_std:.2g} % {'fast' if rate >= 0.0 else 'slow'} against it."
     )
     if corrected:
         text += " The extended twin does not hold this: it is of the aligned recording."
@@ -90,23 +90,27 @@ def with_reference_clock(
         verdict=verdict,
         causes=tuple(causes),
         sentences=(text, *diagnosis.sentences) if corrected else (*diagnosis.sentences, text),
-        reference_clock=dict(clock),
+        reference_clock=clock,
     )
 
 
-def _is_of_alignment(cause: NamedCause, clock: Mapping[str, float], stds: float) -> bool:
+def _is_of_alignment(cause: NamedCause, clock: ReferenceClock, stds: float) -> bool:
     """Return whether a cause is one delay, or one rate error, within some standard deviations of the alignment."""
     if len(cause.parameters) != 1:
         return False
     [(key, value)] = cause.parameters.items()
-    most = {"delay_s": "offset_std_s", "time_constant_s": "offset_std_s", "ratio": "rate_error_std"}.get(key)
+    most = {
+        "delay_s": clock.offset_std_s,
+        "time_constant_s": clock.offset_std_s,
+        "ratio": clock.rate_error_std,
+    }.get(key)
     if most is None or (key == "ratio" and cause.effect != "clock_error"):
         return False
-    return abs(float(value)) <= stds * clock[most]
+    return abs(float(value)) <= stds * most
 
 
-def _as_sure(cause: NamedCause, clock: Mapping[str, float]) -> NamedCause:
+def _as_sure(cause: NamedCause, clock: ReferenceClock) -> NamedCause:
     """Return a cause; a clock error no surer than the alignment, as the offset that it was found at is not exact."""
     if cause.effect != "clock_error":
         return cause
-    return replace(cause, std={key: float(np.hypot(std, clock["rate_error_std"])) for key, std in cause.std.items()})
+    return replace(cause, std={key: float(np.hypot(std, clock.rate_error_std)) for key, std in cause.std.items()})

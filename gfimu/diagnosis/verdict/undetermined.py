@@ -10,16 +10,17 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import qr
 
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.declared import Declared, figure
 from gfimu.diagnosis.fit.gauss_newton import determined
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.screening import Screening, Signature
-from gfimu.geometry.array import AccelerometerArray
 
 __all__ = ["Undetermined", "undetermined", "undetermined_sentence"]
 
@@ -28,22 +29,14 @@ _LISTED = 3  # numerical: combinations in a sentence
 
 
 @dataclass(frozen=True)
-class Undetermined:
-    """A combination of the sizes of an effect that the data can't see.
+class Undetermined(Declared):
+    """A combination of the sizes of an effect that the data can't see."""
 
-    Parameters
-    ----------
-    effect : str
-        Contract name.
-    combination : dict of str to float
-        Sizes by key that move together, relative to the largest.
-    """
-
-    effect: str
-    combination: dict[str, float]
+    effect: Annotated[str, figure("The effect.")]
+    combination: Annotated[dict[str, float], figure("Weights by parameter, relative to the largest.")]
 
     @property
-    def text(self) -> str:
+    def text(self) -> Annotated[str, figure("The combination in words.")]:
         """The combination in words."""
         keys = list(self.combination)
         if len(keys) == 1:
@@ -52,10 +45,6 @@ class Undetermined:
         if np.ptp(weights) < _ALIKE:
             return f"{self.effect} {', '.join(keys)} by the same amount"
         return f"{self.effect} " + ", ".join(f"{key} × {weight:.2g}" for key, weight in self.combination.items())
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON form."""
-        return {"effect": self.effect, "combination": dict(self.combination), "text": self.text}
 
 
 def undetermined(

@@ -3,71 +3,45 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.base.declared import Declared, figure, plain
+from gfimu.base.files.atomic_file import write_text
+from gfimu.base.results import Panel, PlottedResult, Series
+from gfimu.base.short_repr import joined
 from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.criticism.views.rigid_motion import RigidMotion
 from gfimu.diagnosis.criticism.views.run_view import RunView
-from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.verdict.parts import NamedCause, Residual, Rival, Unexplained
-from gfimu.files.atomic_file import write_text
-from gfimu.lazy_names import command_above
-from gfimu.results import Panel, RunResult, Series
-from gfimu.short_repr import joined
-from gfimu.world_model import WorldModel
+from gfimu.diagnosis.verdict.parts import (
+    Interrupted,
+    NamedCause,
+    NoiseLevels,
+    ReferenceClock,
+    Residual,
+    Rival,
+    Unexplained,
+    is_in_part,
+)
+from gfimu.diagnosis.verdict.undetermined import Undetermined
+from gfimu.model.world_model import WorldModel
 
 __all__ = ["FORMAT_VERSION", "Diagnosis"]
 
 FORMAT_VERSION = 1  # numerical: of verdict.json, no threshold
 
 
-@dataclass(frozen=True)
-class Diagnosis(RunResult):
-    """The result of a diagnosis.
+@dataclass(frozen=True, kw_only=True)
+class Diagnosis(Declared, PlottedResult):
+    """The result of a diagnosis: what a simulation gets wrong, and why.
 
-    Parameters
-    ----------
-    verdict : {"nothing_found", "explained", "ambiguous", "unknown"}
-        The verdict.
-    causes : tuple of NamedCause
-        By contribution; of an ambiguous verdict, the effects that can't be distinguished.
-    residual, gain, unexplained
-        See their classes.
-    rivals : tuple of Rival
-        Other explanations, best first.
-    twin : WorldModel
-        The extended twin.
-    runs : tuple of RunView
-        The data for pictures.
-    sentences : tuple of str
-        The verdict in words, most important first.
-    noise : mapping
-        Noise levels estimated: ``white_over_data_sheet``, ``bias_instability_m_s2`` (median of the channels),
-        ``bias_instability_largest_m_s2`` and ``bias_instability_largest_channel``, ``reference_white``; and
-        ``calibration_residue``, small errors of all the twin's numbers at once, in units of what a good calibration
-        leaves (0 where there are none).
-    undetermined : tuple of mapping
-        Combinations of sizes that these data can't see, which stay at zero: ``effect``, ``combination`` (weights by
-        key) and ``text``.
-    rigid : RigidMotion, optional
-        Whether the residual of the given simulation is a motion of the whole array; None for a free body.
-    library_probability : float
-        Probability that the causes are the truth and are confounded with nothing outside the library, the least of
-        them; it is in their own probabilities. NaN where no cause was inferred.
-    coincidence : float
-        Log odds of the likeliest pattern that binds the free numbers of the causes, nats; NaN where none can be tested.
-    mounting_rotvec_rad : tuple of float
-        How the array was turned from upright in the first run, as a rotation vector, for the pictures.
-    reference_clock : mapping
-        Of a reference that was aligned before the diagnosis: ``offset_s`` (the channels' clock less the reference's at
-        the first sample), ``rate_error`` (seconds of the channels' clock per second of the reference's, less one), and
-        their standard deviations ``offset_std_s`` and ``rate_error_std``. Empty for all others.
+    ``twin`` is the extended twin and ``runs`` are the data for pictures; ``mounting_rotvec_rad`` is how the array was
+    turned from upright in the first run, as a rotation vector.
 
     Examples
     --------
@@ -77,21 +51,50 @@ class Diagnosis(RunResult):
     >>> found.report("diagnosis")  # doctest: +SKIP
     """
 
-    verdict: str
-    causes: tuple[NamedCause, ...]
-    residual: Residual
-    gain: Gain
-    unexplained: Unexplained
-    rivals: tuple[Rival, ...]
+    format_version: Annotated[int, figure("Version of the format.")] = FORMAT_VERSION
+    verdict: Annotated[str, figure("nothing_found, explained, ambiguous or unknown.")]
+    interrupted: Annotated[Interrupted | None, figure("What ended the diagnosis early; null where nothing did.")] = None
+    library_probability: Annotated[
+        float,
+        figure(
+            "Probability that the library, or the grammar, holds the truth: that the causes are confounded with "
+            "nothing outside it, the least of them; null where no cause was inferred."
+        ),
+    ] = float("nan")
+    coincidence: Annotated[
+        float,
+        figure(
+            "Log odds of the likeliest pattern that binds the free numbers of the causes; null: none can be tested.",
+            "nats",
+            key="coincidence_nats",
+        ),
+    ] = float("nan")
+    sentences: Annotated[tuple[str, ...], figure("The verdict in words, most important first.")]
+    reference_clock: Annotated[
+        ReferenceClock | None, figure("Clock of the reference; null where it was not aligned.")
+    ] = None
+    causes: Annotated[
+        tuple[NamedCause, ...],
+        figure("Causes by contribution; of an ambiguous verdict the effects that can't be distinguished."),
+    ]
+    residual: Annotated[Residual, figure("Prediction error before and after.")]
+    gain: Annotated[Gain, figure("What the extension is worth.")]
+    unexplained: Annotated[Unexplained, figure("What nothing in the library explains.")]
+    rigid: Annotated[
+        RigidMotion | None,
+        figure(
+            "How the residual of the given simulation divides into single chips and the whole array; null where that "
+            "can't be tested.",
+            key="rigid_motion",
+        ),
+    ] = None
+    rivals: Annotated[tuple[Rival, ...], figure("Other explanations, best first.")]
+    noise: Annotated[NoiseLevels, figure("Noise levels that were estimated.")]
+    undetermined: Annotated[
+        tuple[Undetermined, ...], figure("Combinations of sizes that these data can't see, which stay at zero.")
+    ] = ()
     twin: WorldModel
     runs: tuple[RunView, ...]
-    sentences: tuple[str, ...]
-    noise: Mapping[str, Any]
-    undetermined: tuple[Mapping[str, Any], ...] = ()
-    rigid: RigidMotion | None = None
-    library_probability: float = float("nan")
-    coincidence: float = float("nan")
-    reference_clock: Mapping[str, float] = field(default_factory=dict)
     mounting_rotvec_rad: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def to_columns(self) -> dict[str, NDArray[Any]]:
@@ -170,30 +173,18 @@ class Diagnosis(RunResult):
         )
         return Panel(f"measured less predicted, {channels[worst]}", "specific force, m/s²", series, view.t)
 
-    def report(self, folder: str | Path) -> Path:
-        """Write the folder of the diagnosis: verdict, extended twin, ``report.html`` and a rerun recording.
-
-        Parameters
-        ----------
-        folder : str or Path
-            Folder to write; made if it isn't there, in one that is.
-
-        Returns
-        -------
-        Path
-            The report, for a browser.
-
-        Raises
-        ------
-        InputError
-            If the folder can't be written.
-        """
-        return Path(command_above("write_report")(self, folder))
-
     @property
-    def in_part(self) -> bool:
-        """Whether the causes stand but leave more than a tenth of the excess on held-out data."""
-        return self.verdict == "explained" and self.gain.share_of_excess_removed < 1.0 - Policy.small
+    def in_part(
+        self,
+    ) -> Annotated[
+        bool,
+        figure(
+            "Whether the causes leave more than a tenth of the excess on held-out data, or something significant.",
+            before="interrupted",
+        ),
+    ]:
+        """Whether the causes stand but leave more than a tenth of the excess on held-out data, or what is no chance."""
+        return is_in_part(self.verdict, self.gain, self.unexplained)
 
     def __repr__(self) -> str:
         causes = ", ".join(f"{cause.effect} {100 * cause.probability:.3g} %" for cause in self.causes)
@@ -203,31 +194,11 @@ class Diagnosis(RunResult):
     @property
     def calibration_residue(self) -> float:
         """Size of a residue of the twin's calibration, 0 where there is none."""
-        return float(self.noise.get("calibration_residue", 0.0))
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON form of the contract."""
-        return {
-            "format_version": FORMAT_VERSION,
-            "verdict": self.verdict,
-            "in_part": self.in_part,
-            "library_probability": self.library_probability,
-            "coincidence_nats": self.coincidence,
-            "sentences": list(self.sentences),
-            "reference_clock": dict(self.reference_clock) or None,
-            "causes": [cause.to_dict() for cause in self.causes],
-            "residual": self.residual.to_dict(),
-            "gain": self.gain.to_dict(),
-            "unexplained": self.unexplained.to_dict(),
-            "rigid_motion": None if self.rigid is None else self.rigid.to_dict(),
-            "rivals": [rival.to_dict() for rival in self.rivals],
-            "noise": dict(self.noise),
-            "undetermined": [dict(one) for one in self.undetermined],
-        }
+        return self.noise.calibration_residue or 0.0
 
     def to_json(self) -> str:
         """Return ``verdict.json``; NaN becomes null."""
-        return json.dumps(_finite(self.to_dict()), indent=2, allow_nan=False) + "\n"
+        return json.dumps(plain(self.to_dict()), indent=2, allow_nan=False) + "\n"
 
     def write(self, directory: str | Path) -> None:
         """Write ``verdict.json`` and ``twin.toml`` into a folder."""
@@ -242,15 +213,3 @@ def _is_number(value: object) -> bool:
 
 def _in_words(value: object) -> str:
     return ", ".join(map(str, value)) if isinstance(value, list | tuple) else str(value)
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
-    if isinstance(value, list):
-        return [_finite(item) for item in value]
-    if isinstance(value, np.generic):
-        value = value.item()
-    if isinstance(value, float) and not np.isfinite(value):
-        return None
-    return value

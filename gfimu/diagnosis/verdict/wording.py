@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.verdict.parts import NamedCause, Residual, Unexplained
-from gfimu.units import STANDARD_GRAVITY
+from gfimu.diagnosis.verdict.parts import NamedCause, Residual, Unexplained, is_in_part
 
 __all__ = ["SAME_SHARE", "Notes", "verdict_sentences"]
 
@@ -98,10 +98,13 @@ def _held_out(residual: Residual, gain: Gain) -> list[str]:
 def _left_over(verdict: str, residual: Residual, unexplained: Unexplained, rest: str) -> list[str]:
     """Say what the causes leave; an unknown verdict says it at first."""
     if unexplained.significant:
-        sentence = f"A significant residual remains that nothing in the library explains: {unexplained.signature}."
+        sentence = (
+            f"A significant residual remains that nothing in the library explains, {residual.left_in_words}: "
+            f"{unexplained.signature}."
+        )
         return [] if verdict == "unknown" else [sentence]
     over = residual.rms_after / max(residual.noise_floor, 1e-12)
-    if verdict != "explained" or over <= 1.0 + Policy.small:
+    if verdict != "explained" or residual.is_noise:
         return []
     sentence = (
         f"The remaining residual is {over:.2f} times the noise{f' ({rest})' if rest else ''}: "
@@ -156,11 +159,10 @@ def _headline(verdict: str, causes: Sequence[NamedCause], unexplained: Unexplain
         return "No single thing is wrong with the simulation."
     if verdict == "nothing_found":
         return "The simulation agrees with the measurement: nothing was found beyond the sensors' own noise."
-    if verdict == "explained" and gain.share_of_excess_removed < 1.0 - Policy.small:
-        return (
-            f"The simulation is wrong in part because of {names}: {100 * gain.share_of_excess_removed:.0f} % of the "
-            "excess is gone on validation data."
-        )
+    if is_in_part(verdict, gain, unexplained):
+        share = gain.share_of_excess_removed
+        gone = f": {100 * share:.3g} % of the excess is gone on validation data" if np.isfinite(share) else ""
+        return f"The simulation is wrong in part because of {names}{gone}."
     if verdict == "explained":
         return f"The simulation is wrong because of {names}."
     if verdict == "ambiguous":

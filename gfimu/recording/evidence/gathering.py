@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from gfimu.errors import InputError
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.parts.limits import PartLimits
-from gfimu.rate.integration import integrate_samples
+from gfimu.array.array import AccelerometerArray
+from gfimu.array.integration import integrate_samples
+from gfimu.array.parts.limits import PartLimits
+from gfimu.base.errors import InputError
 from gfimu.recording.evidence.rigid import FEWEST, Evidence, Window
 from gfimu.recording.recording import Recording
 from gfimu.recording.rest import detect_rest

@@ -9,11 +9,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.parts.limits import PartLimits
+from gfimu.array.array import AccelerometerArray
+from gfimu.array.parts.limits import PartLimits
+from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.recording.evidence.ways import unit_remedy
 from gfimu.recording.recording import Recording
-from gfimu.units import STANDARD_GRAVITY
 
 __all__ = ["gravity_text"]
 

@@ -13,12 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.geometry.kinematics import omega_products
-from gfimu.parts.limits import PartLimits
+from gfimu.array.array import AccelerometerArray
+from gfimu.array.kinematics import omega_products
+from gfimu.array.parts.limits import PartLimits
+from gfimu.base.units import GYRO_COLUMNS, REFERENCE_UNITS, reference_quantity
 from gfimu.recording.evidence.rigid import Matrices, product_slopes, rates_of
 from gfimu.recording.recording import Recording
-from gfimu.units import GYRO_COLUMNS, REFERENCE_UNITS, reference_quantity
 
 __all__ = ["OddRate", "RatePolicy", "odd_rates"]
 

@@ -19,11 +19,11 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.geometry.kinematics import omega_products
-from gfimu.parts.limits import PartLimits
+from gfimu.array.array import AccelerometerArray
+from gfimu.array.kinematics import omega_products
+from gfimu.array.parts.limits import PartLimits
+from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.recording.evidence.rotation_normal import rotation_normal
-from gfimu.units import STANDARD_GRAVITY
 
 __all__ = ["FEWEST", "Costs", "Evidence", "Matrices", "Otherwise", "Window", "product_slopes", "rates_of"]
 

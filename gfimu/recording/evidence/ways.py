@@ -8,10 +8,10 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.files.model_files import list_models
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.files.model_files import list_models
+from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.recording.evidence.rigid import Evidence, Otherwise
-from gfimu.units import STANDARD_GRAVITY
 
 __all__ = ["TIME_UNITS", "both_ways", "time_text", "unit_remedy", "ways_to_read"]
 

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.base.short_repr import short_repr
 from gfimu.recording.recording import Recording
-from gfimu.short_repr import short_repr
 
 __all__ = ["ConversionTimes", "conversion_times", "output_data_rate"]
 

@@ -12,8 +12,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.base.units import TIME_COLUMNS
 from gfimu.recording.recording import Recording
-from gfimu.units import TIME_COLUMNS
 
 __all__ = ["reference_on_rows", "reference_series", "reference_times"]
 

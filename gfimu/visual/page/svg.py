@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from PIL import Image
 
-from gfimu.visual.colours import INK, NOISE_ON_PAPER, PAGE, chip_colour, css
+from gfimu.base.results.colours import INK, NOISE_ON_PAPER, PAGE, chip_colour, css
 
 __all__ = ["GRID", "ON_PAGE", "svg_text", "themed"]
 

@@ -11,9 +11,9 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.geometry.turning_axis import TurningAxis
-from gfimu.visual.colours import AXES, INK, METAL, NOISE_ON_PAPER, SPIN_AXIS_ON_PAPER, STYLES, chip_colour, css
+from gfimu.array.array import AccelerometerArray
+from gfimu.array.turning_axis import TurningAxis
+from gfimu.base.results.colours import AXES, INK, METAL, NOISE_ON_PAPER, SPIN_AXIS_ON_PAPER, STYLES, chip_colour, css
 from gfimu.visual.rig.package import Package, drawing_size, package_of
 from gfimu.visual.rig.words import short_name
 

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.short_repr import short_repr
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.short_repr import short_repr
 
 __all__ = ["Package", "chip_half_size", "drawing_size", "is_cube", "package_of", "stand_height"]
 

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.geometry.turning_axis import TurningAxis
-from gfimu.visual.colours import AXES, ESTIMATE, GRAVITY, METAL, SPIN_AXIS, TABLE, chip_colour
+from gfimu.array.array import AccelerometerArray
+from gfimu.array.turning_axis import TurningAxis
+from gfimu.base.results.colours import AXES, ESTIMATE, GRAVITY, METAL, SPIN_AXIS, TABLE, chip_colour
 from gfimu.visual.rig.package import chip_half_size, drawing_size, is_cube, package_of
 from gfimu.visual.scene import Box, Cylinder, Names, Pointers, Shape
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.array.array import AccelerometerArray
 from gfimu.visual.motion import KnownMotion
 from gfimu.visual.rig.package import Package, is_cube, package_of
 

@@ -17,9 +17,10 @@ from firmware_bridge.frames.frame_format import FORMATS
 from firmware_bridge.host.mounting.on_board import candidate_arrays, mounting_words
 from firmware_bridge.host.recorder import record as record_port
 from firmware_bridge.loop.virtual_port import TcpPort
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import InputError, RecordingWarning
 from gfimu.commands.record import record
-from gfimu.errors import InputError, RecordingWarning
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.commands.record_settings import BoardSettings, RecordCallbacks
 from gfimu.recording import Recording
 from sim.scenarios import Scenario
 from sim.simulation import simulate
@@ -67,11 +68,11 @@ class SmallBoard:
         self.port.close()
 
 
-def recorded(board: SmallBoard, out, **options):
+def recorded(sender: SmallBoard, out, **options):
     """The report, the recording, and the warnings."""
-    with board, warnings.catch_warnings(record=True) as caught:
+    with sender, warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        report = record(board.name, out, duration=SECONDS - 0.5, **options)
+        report = record(sender.name, out, duration=SECONDS - 0.5, **options)
     texts = [str(one.message) for one in caught if issubclass(one.category, RecordingWarning)]
     return report, Recording.read(out), texts
 
@@ -96,7 +97,7 @@ def test_an_open_array_is_one_warning_that_names_both_and_what_the_samples_show(
 
 @pytest.mark.parametrize(("real", "wrong"), [("cube12_as_built", "cube12"), ("cube12", "cube12_as_built")])
 def test_a_wrong_array_is_flagged_when_the_recording_ends(tmp_path, real: str, wrong: str) -> None:
-    report, _, texts = recorded(SmallBoard(real, real), tmp_path / "run.csv", array=wrong)
+    report, _, texts = recorded(SmallBoard(real, real), tmp_path / "run.csv", board=BoardSettings(array=wrong))
     assert (report.array, report.board_array) == (wrong, real)
     assert len(texts) == 2
     assert f"the board states array {real!r}, and {wrong!r} was given" in texts[0]
@@ -110,7 +111,9 @@ def test_the_answer_of_a_person_is_taken(tmp_path) -> None:
         asked.extend(array.name for array in candidates)
         return "cube12_as_built"
 
-    report, run, texts = recorded(SmallBoard("cube12_as_built"), tmp_path / "run.csv", choose_array=choose)
+    report, run, texts = recorded(
+        SmallBoard("cube12_as_built"), tmp_path / "run.csv", callbacks=RecordCallbacks(choose_array=choose)
+    )
     assert asked == ["cube12", "cube12_as_built"]
     assert report.array_stated_by == "answer"
     assert run.array is not None

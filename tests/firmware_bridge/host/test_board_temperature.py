@@ -11,8 +11,9 @@ import pytest
 
 from firmware_bridge.loop.virtual_port import TcpPort
 from gfimu import calibrate, check, inspect
-from gfimu.cli.check import print_check
 from gfimu.commands.record import record
+from gfimu.commands.record_settings import BoardSettings
+from gfimu.commands.shell.printing import print_blocks
 from gfimu.recording import Recording
 from sim.scenarios import Scenario
 from sim.simulation import simulate
@@ -49,7 +50,7 @@ def recorded(warming, tmp_path_factory):
 
     thread = threading.Thread(target=send)
     thread.start()
-    report = record(port.name, out, form="arduino_csv", duration=warming.duration - 0.5)
+    report = record(port.name, out, board=BoardSettings(form="arduino_csv"), duration=warming.duration - 0.5)
     done.set()
     thread.join()
     port.close()
@@ -70,8 +71,8 @@ def test_a_check_and_an_inspection_show_it(warming, recorded, capsys) -> None:
     tacho = np.interp(run.t_s, warming.t_s, warming.reference["tacho_rad_s"])
     found = check(replace(run, reference={**run.reference, "tacho_rad_s": tacho}), "cube12_turntable")
     lowest, highest = report.temperature_degC
-    assert (found.runs[0]["lowest_degC"], found.runs[0]["highest_degC"]) == pytest.approx((lowest, highest))
-    print_check(found)
+    assert (found.runs[0].lowest_degC, found.runs[0].highest_degC) == pytest.approx((lowest, highest))
+    print_blocks(found.shown())
     assert f"Temperature of run 1: {lowest:.4g} to {highest:.4g} °C." in capsys.readouterr().out
     (column,) = (one for one in inspect(out).columns if one.name == "temperature_degC")
     assert (column.least, column.most) == pytest.approx((lowest, highest))

@@ -19,8 +19,8 @@ from firmware_bridge.frames.decoder import encode_samples
 from firmware_bridge.host.link import Link
 from firmware_bridge.host.recorder import SampleClock, record
 from firmware_bridge.loop.virtual_port import open_port, serve
-from gfimu.errors import GfimuError, InputError
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import GfimuError, InputError
 from gfimu.recording import Recording
 
 needs_board = pytest.mark.skipif(
@@ -263,7 +263,7 @@ def test_lost_link_raises_after_its_patience(server: Server) -> None:
 
 
 @needs_board
-@pytest.mark.soak
+@pytest.mark.study
 def test_ten_minutes_at_3200_hz(tmp_path) -> None:
     import resource
 

@@ -20,7 +20,7 @@ from firmware_bridge.host.journal import Journal, JournalError
 from firmware_bridge.host.link import Link
 from firmware_bridge.host.recorder import record
 from firmware_bridge.loop.virtual_port import PseudoTerminal
-from gfimu.errors import GfimuError, InputError
+from gfimu.base.errors import GfimuError, InputError
 from gfimu.recording import Recording
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals and limits on Windows")
@@ -209,7 +209,7 @@ def test_the_command_ends_with_one_line_and_code_1(feed, tmp_path) -> None:
     out = tmp_path / "run.parquet"
     program = (
         "import resource, signal, sys\n"
-        "from gfimu.cli import main\n"
+        "from gfimu.commands.shell.program import main\n"
         "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, 60_000))\n"  # as a disk with so much room for a file
         f"sys.argv = ['gfimu', 'record', '--port', {feed.port.name!r}, '--out', {str(out)!r}]\n"

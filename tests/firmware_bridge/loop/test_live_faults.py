@@ -11,6 +11,7 @@ import pytest
 from firmware_bridge.adxl345.registers import TICKS_PER_SECOND
 from firmware_bridge.loop.virtual_port import open_port, serve
 from gfimu.commands.record import record
+from gfimu.commands.record_settings import BoardSettings, RecordCallbacks
 from gfimu.recording import Recording
 
 needs_board = pytest.mark.skipif(
@@ -46,7 +47,11 @@ def test_a_chip_that_goes_wrong_is_named_while_recording(tmp_path) -> None:
         thread.start()
         try:
             report = record(
-                port.name, tmp_path / "run.csv", duration=14.0, rate=100, array="cube12", on_fault=sentences.append
+                port.name,
+                tmp_path / "run.csv",
+                duration=14.0,
+                board=BoardSettings(rate=100, array="cube12"),
+                callbacks=RecordCallbacks(on_fault=sentences.append),
             )
         finally:
             done.set()

@@ -288,6 +288,33 @@ def test_every_command_is_answered(host: Host, command: bytes, result: Result) -
     assert replies == [Reply(command[2], result)]
 
 
+@pytest.mark.parametrize(
+    "command",
+    [
+        encode_command(Command.START),
+        encode_command(Command.STOP),
+        set_rate(800),
+        set_rate(100, 15),
+        set_range(4),
+        encode_command(Command.SELF_TEST, 1),
+        encode_command(Command.IDENTIFY),
+        encode_command(Command.SET_BAUD, 921_600),
+    ],
+)
+def test_no_command_uses_the_chips_while_the_sample_timer_runs(host: Host, command: bytes) -> None:
+    host.library.host_start()
+    host.sample(5)
+    exchange, running = host._exchange, []
+    host._callback = EXCHANGE(lambda *words: (running.append(host.library.host_timer_hz()), exchange(*words))[1])
+    host.library.host_set_exchange(host._callback)
+    host.send(command)
+    host.drain()
+    host.library.host_poll()
+    assert not any(running)
+    stopped = command == encode_command(Command.STOP)
+    assert bool(host.library.host_timer_hz()) is not stopped
+
+
 def test_wrong_length_is_refused(host: Host) -> None:
     body = b"\xc3\x3c" + bytes((Command.SELF_TEST, 2, 1, 1))
     host.send(body + crc16(body).to_bytes(2, "little"))

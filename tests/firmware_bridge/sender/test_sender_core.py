@@ -164,6 +164,24 @@ def test_frames_are_those_of_the_firmwares_core(sender_library, core_library) ->
     assert not (samples.status & Status.LATE).any()
 
 
+def test_commands_at_every_moment_of_a_period_cost_no_chip(sender_library) -> None:
+    sender, rng = Sender(sender_library), np.random.default_rng(2)
+    sender.give(set_rate(3200))
+    decoder = SampleDecoder()
+    decoder.feed(sender.run(50_000))
+    others = (set_rate(3200), set_range(16), encode_command(Command.SELF_TEST, 0), encode_command(Command.IDENTIFY))
+    parts = []
+    for command in [encode_command(Command.START)] * 60 + [*others] * 10:
+        sender.give(command)
+        parts.append(decoder.feed(sender.run(sender.now // US + 3_000 + int(rng.integers(0, 313)))))
+    samples = Samples.join(parts)
+    first = (samples.status & Status.FIRST) != 0
+    assert first.sum() == 90
+    assert not np.any(samples.status & (0xF | Status.CHIP_FAULT))
+    assert np.all(np.diff(samples.sequence.astype(int))[~first[1:]] == 1)
+    assert (decoder.counts.lost, decoder.counts.corrupt, decoder.counts.skipped_bytes) == (0, 0, 0)
+
+
 def test_the_sample_clock_keeps_the_rate_that_is_no_whole_number_of_microseconds(sender_library) -> None:
     sender = Sender(sender_library)
     sender.give(set_rate(300))

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import gfimu
-from gfimu.errors import InputError
+from gfimu import InputError
 from tests.firmware_bridge.sender.conftest import CORE, STRICT
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="there are no pseudo-terminals on Windows")
@@ -43,7 +43,12 @@ def test_a_recording_is_made_with_rate_range_speed_and_self_test(program, tmp_pa
     axes = []
     with running(program) as port:
         report = gfimu.record(
-            port, tmp_path / "run.csv", duration=1.0, rate=400, range_g=8, self_test=True, on_self_test=axes.extend
+            port,
+            tmp_path / "run.csv",
+            self_test=True,
+            duration=1.0,
+            board=gfimu.BoardSettings(rate=400, range_g=8),
+            callbacks=gfimu.RecordCallbacks(on_self_test=axes.extend),
         )
     assert [axis.verdict for axis in axes] == ["passed"] * 12
     assert report.identity is not None
@@ -57,7 +62,7 @@ def test_a_recording_is_made_with_rate_range_speed_and_self_test(program, tmp_pa
 def test_one_chip(compile_sender, tmp_path) -> None:
     one = compile_sender(*STRICT, "-DGFIMU_CHIPS=1", "ports/host.c", *CORE)
     with running(one) as port:
-        report = gfimu.record(port, tmp_path / "run.csv", duration=0.5, array="one_adxl345")
+        report = gfimu.record(port, tmp_path / "run.csv", duration=0.5, board=gfimu.BoardSettings(array="one_adxl345"))
     recording = gfimu.Recording.read(tmp_path / "run.csv")
     assert recording.channels == ("a11", "a12", "a13")
     assert recording.readings.mean(axis=0) / COUNT_M_S2 == pytest.approx(at_rest(1), abs=0.6)
@@ -82,12 +87,12 @@ def test_a_sender_states_its_array_and_its_temperature(compile_sender, tmp_path)
 def test_two_of_four_chips_that_answer(program, tmp_path) -> None:
     with running(program, "--chips", "2") as port:
         report = gfimu.record(port, tmp_path / "all.csv", duration=0.5)
-        gfimu.record(port, tmp_path / "two.csv", duration=0.5, array="toolhead_pair")
+        gfimu.record(port, tmp_path / "two.csv", duration=0.5, board=gfimu.BoardSettings(array="toolhead_pair"))
         with pytest.raises(InputError, match="array 'one_adxl345' has 1 chip, but 2 answer"):
-            gfimu.record(port, tmp_path / "one.csv", duration=0.5, array="one_adxl345")
+            gfimu.record(port, tmp_path / "one.csv", duration=0.5, board=gfimu.BoardSettings(array="one_adxl345"))
         for other in ("corners8", "nap_3_2_2_2"):  # the second has three times three channels, on four chips
             with pytest.raises(InputError, match=f"'{other}' has .* channels, lpc1768 12, or 3 for each chip"):
-                gfimu.record(port, tmp_path / "other.csv", duration=0.5, array=other)
+                gfimu.record(port, tmp_path / "other.csv", duration=0.5, board=gfimu.BoardSettings(array=other))
     assert report.status_counts["sensor_3_missing"] == report.stream.samples
     assert np.isnan(gfimu.Recording.read(tmp_path / "all.csv").readings[:, 6:]).all()
     two = gfimu.Recording.read(tmp_path / "two.csv")

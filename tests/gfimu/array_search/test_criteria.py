@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 from scipy.optimize import approx_fprime
 
+from gfimu.array.array import AccelerometerArray
 from gfimu.array_search.criteria import Goal
-from gfimu.array_search.exchange import drawn_rows, figure
+from gfimu.array_search.exchange import drawn_rows, log_figure
 from gfimu.array_search.objectives import OBJECTIVES, Conditions, objective
 from gfimu.array_search.polish import _objective, _Variables, alpha_leakage, leakage_and_slope
 from gfimu.array_search.problem import Design, Problem, Tolerance, rows_of, slopes_by_design
+from gfimu.array_search.scoring import score
 from gfimu.array_search.shapes import box, frames_across
-from gfimu.bounds.sample import alpha_std, rate_bound
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.geometry.scoring import score
-from gfimu.integrity.detectable import detectable_faults
-from gfimu.position_drift import drift_budget
+from gfimu.budget.drift import drift_budget
+from gfimu.rate.bounds.sample import alpha_std, rate_bound
+from gfimu.rate.health.detectable import detectable_faults
 from gfimu.rate.sensing import SensorErrors
 
 CUBE = box((0.1, 0.1, 0.1))
@@ -105,7 +105,7 @@ def random_array():
 def of(name, random_array, **conditions):
     problem, design, array = random_array
     conditions = Conditions(noise_m_s2=0.02, bias_m_s2=0.05, **conditions)
-    return np.exp(figure(problem, objective(name, problem, conditions).goal, design)), array
+    return np.exp(log_figure(problem, objective(name, problem, conditions).goal, design)), array
 
 
 def test_gdop_and_kappa_are_those_of_score(random_array):
@@ -152,8 +152,8 @@ def test_the_worst_draw_counts_and_the_nominal_array_is_one_of_them(random_array
     goal = objective("gdop_worst", loose, Conditions()).goal
     rows = drawn_rows(loose, design.positions, design.axes, np.arange(6)).reshape(17, -1, 12)
     each = np.exp(0.5 * np.log([np.trace(np.linalg.inv(one[:, :6].T @ one[:, :6])) for one in rows]))
-    assert np.exp(figure(loose, goal, design)) == pytest.approx(each.max())
-    assert each[0] == pytest.approx(np.exp(figure(problem, objective("gdop", problem, Conditions()).goal, design)))
+    assert np.exp(log_figure(loose, goal, design)) == pytest.approx(each.max())
+    assert each[0] == pytest.approx(np.exp(log_figure(problem, objective("gdop", problem, Conditions()).goal, design)))
     moved, turned = loose.draws
     assert np.abs(moved).max() <= 0.002 / loose.unit
     assert np.ptp(moved[1:], axis=0).min() > 0

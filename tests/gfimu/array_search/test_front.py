@@ -8,7 +8,7 @@ from gfimu.array_search.objectives import Conditions, objective
 from gfimu.array_search.problem import Problem, Sites, Tolerance
 from gfimu.array_search.search import search
 from gfimu.array_search.shapes import box
-from gfimu.errors import InputError
+from gfimu.base.errors import InputError
 
 CUBE = box((0.1, 0.1, 0.1))
 
@@ -25,7 +25,7 @@ def test_more_chips_see_better_and_each_keeps_its_bound():
         assert point.bounds[1] == pytest.approx(np.sqrt(9 / (2 * point.values[0])), rel=1e-6)
         assert point.bounds[1] * (1 - 1e-9) <= point.values[1] < 1.05 * point.bounds[1]
     turned = front(Problem(4, 3, CUBE), "gdop", "chips", most_chips=5, starts=1)
-    assert turned.units == ("", "")
+    assert [one.unit for one in turned.objectives] == ["", ""]
     assert [point.values[1] for point in turned.points] == [5, 4]
 
 

@@ -7,7 +7,7 @@ from gfimu.array_search.objectives import Conditions, objective
 from gfimu.array_search.problem import Problem, Sites, Tolerance
 from gfimu.array_search.search import search
 from gfimu.array_search.shapes import box, cylinder, sphere
-from gfimu.errors import GeometryError, InputError
+from gfimu.base.errors import GeometryError, InputError
 
 CUBE = box((0.1, 0.1, 0.1))
 CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * 0.05
@@ -110,11 +110,11 @@ def test_the_least_condition_number_and_fault_meet_their_bounds():
 def test_the_worst_case_is_worse_and_better_than_that_of_the_nominal_optimum():
     loose = Problem(5, 3, CUBE, tolerance=Tolerance(0.004, 0.0, 8))
     nominal, robust = found(loose), found(loose, "gdop_worst", starts=1)
-    from gfimu.array_search.exchange import figure
+    from gfimu.array_search.exchange import log_figure
     from gfimu.array_search.problem import Design
 
     design = Design(nominal.array.chip_positions / 0.05, np.broadcast_to(np.eye(3), (5, 3, 3)), np.full(5, -1))
-    of_nominal = np.exp(figure(loose, objective("gdop_worst", loose, Conditions()).goal, design))
+    of_nominal = np.exp(log_figure(loose, objective("gdop_worst", loose, Conditions()).goal, design))
     assert nominal.value < robust.value <= of_nominal * (1 + 1e-6)
 
 

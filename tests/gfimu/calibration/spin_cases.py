@@ -4,13 +4,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from gfimu.array.array import AccelerometerArray
+from gfimu.array.kinematics import specific_force
+from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.calibration.methods import calibrate
 from gfimu.calibration.spin import SpinPolicy, spin
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.geometry.kinematics import specific_force
 from gfimu.recording import Recording
 from gfimu.recording.carried_array import array_metadata
-from gfimu.units import STANDARD_GRAVITY
 from sim.chips.adxl345 import Sensor, SensorSettings
 from sim.forward import leaning, rigid_readings, table_geometry
 from sim.motions.pose_sequence import PoseSequence

@@ -9,6 +9,9 @@ from recordings import pose_recording
 from scipy.spatial.transform import Rotation
 
 import gfimu.calibration.array_motion as array_motion_module
+from gfimu.array.array import AccelerometerArray
+from gfimu.array.kinematics import specific_force
+from gfimu.base.errors import InputError, UnitError
 from gfimu.calibration.array_calibration import calibrate_array
 from gfimu.calibration.array_motion import array_motion
 from gfimu.calibration.array_static import apparent_alpha, array_static, body_specific_force, disagreement
@@ -17,9 +20,6 @@ from gfimu.calibration.error_model import ErrorModel
 from gfimu.calibration.faults import without_moved_poses
 from gfimu.calibration.motion_reference import motion_reference
 from gfimu.calibration.observations import averaged_poses
-from gfimu.errors import InputError, UnitError
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.geometry.kinematics import specific_force
 from gfimu.recording import Recording
 from gfimu.recording.mimu4444 import read_mimu4444
 from gfimu.recording.rest import detect_rest

@@ -7,13 +7,13 @@ import pytest
 from calibration_cases import CORNERS, EDGES, FACES, GRAVITY, MULTI, assert_honest, chips_in_gauge, poses_of
 from recordings import pose_recording
 
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import InputError, UnitError
 from gfimu.calibration.array_calibration import calibrate_array, update_array_calibration
 from gfimu.calibration.array_static import apparent_alpha, array_static, body_specific_force
 from gfimu.calibration.array_update import array_update
 from gfimu.calibration.error_model import ErrorModel
 from gfimu.calibration.observations import Observations
-from gfimu.errors import InputError, UnitError
-from gfimu.geometry.array import AccelerometerArray
 
 CUBE = AccelerometerArray.load("cube12")
 TURN_ON = 0.03

@@ -23,6 +23,7 @@ def page(project_root):
     return "\n".join(page.read_text(encoding="utf-8") for page in pages)
 
 
+@pytest.mark.study
 def test_what_holds_of_the_persian_papers_ranking(project_root, tmp_path):
     """The statements of the page, on a few triads."""
     script = load(project_root, "compare_calibrations")

@@ -6,15 +6,16 @@ from dataclasses import FrozenInstanceError, fields
 import numpy as np
 import pytest
 from calibration_cases import GRAVITY, MULTI
+from every_item import every
 from recordings import pose_recording
 
+from gfimu.base.errors import InputError
 from gfimu.calibration.error_model import GAUGES
 from gfimu.calibration.methods import CalibrationTask, calibrate, run_calibration
 from gfimu.calibration.registry import METHODS, CalibrationMethod, calibration_method
-from gfimu.errors import InputError
 
 
-@pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
+@every("method", METHODS.values())
 def test_every_record_is_complete(method):
     assert METHODS[method.name] is method
     assert method.needs

@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import InputError, UnitError
 from gfimu.calibration.combine import combine
 from gfimu.calibration.parameter_names import parameter_names
 from gfimu.calibration.result import Calibration, load_calibration
 from gfimu.calibration.run_file import open_calibrated_run
-from gfimu.errors import InputError, UnitError
-from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
 from gfimu.recording.carried_array import array_difference
 

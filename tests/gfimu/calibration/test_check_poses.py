@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import gfimu
+from gfimu.base.errors import InputError
 from gfimu.calibration.check_poses import check_on_poses
 from gfimu.calibration.error_model import ErrorModel
-from gfimu.errors import InputError
 from gfimu.recording import Recording
 
 GRAVITY = 9.80665
@@ -32,7 +32,7 @@ def truth(seed: int) -> ErrorModel:
 
 @pytest.fixture(scope="module")
 def calibrated():
-    return [gfimu.calibrate("multi-position", poses(truth(seed), 18, 100 + seed), n_parameters=9) for seed in range(12)]
+    return [gfimu.calibrate("multi-position", poses(truth(seed), 18, 100 + seed), parameters=9) for seed in range(12)]
 
 
 def test_the_magnitudes_are_as_far_off_as_the_calibration_states(calibrated):
@@ -56,7 +56,7 @@ def test_a_bias_that_moved_after_the_calibration_shows(calibrated):
 
 def test_the_command_states_the_check_and_refuses_the_fitted_recording():
     run, others = poses(truth(1), 18, 1), poses(truth(1), 12, 2)
-    found = gfimu.calibrate("multi-position", run, n_parameters=9, check=others)
+    found = gfimu.calibrate("multi-position", run, parameters=9, check=others)
     assert found.statistics["check_poses"] == 12
     with pytest.raises(InputError, match="needs other poses"):
-        gfimu.calibrate("multi-position", run, n_parameters=9, check=run)
+        gfimu.calibrate("multi-position", run, parameters=9, check=run)

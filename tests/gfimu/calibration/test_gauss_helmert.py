@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from gfimu.base.errors import InputError
 from gfimu.calibration.gauss_helmert import gauss_helmert
-from gfimu.errors import InputError
 
 # P. T. Boggs, R. H. Byrd, J. E. Rogers and R. B. Schnabel, "User's Reference Guide for ODRPACK Version 2.01", p. 49:
 # pressure and volume are the two coordinates of points on an ellipse.
@@ -111,3 +111,49 @@ def test_constraint_by_a_basis():
 def test_no_settling_is_an_error():
     with pytest.raises(InputError, match="did not settle in 2 iterations"):
         gauss_helmert(ellipse, [-1.0, -3.0, 0.09, 0.02, 0.08], ELLIPSE, np.eye(2), max_iterations=2)
+
+
+def shifted(parameters, observations):
+    """One offset for every reading, and a slope on known places."""
+    places = np.linspace(-1.0, 1.0, len(observations))
+    f = parameters[0] + parameters[1] * places - observations[:, 0]
+    a = np.column_stack([np.ones_like(places), places])[:, None, :]
+    return f[:, None], a, -np.ones((len(observations), 1, 1))
+
+
+def test_a_prior_weighs_as_an_observation_of_zero_in_estimate_covariance_and_variance_factor():
+    """A prior 0 ± s of the slope is one more observation, and so one more square and one more redundancy."""
+    data = 0.3 + 0.8 * np.linspace(-1.0, 1.0, 12)[:, None] + np.random.default_rng(3).normal(0.0, 0.2, (12, 1))
+    noise, prior = 0.1, 0.25
+    result = gauss_helmert(shifted, [0.0, 0.0], data, [[noise**2]], prior_std=[np.inf, prior])
+    design = np.vstack([np.column_stack([np.ones(12), np.linspace(-1.0, 1.0, 12)]) / noise, [0.0, 1.0 / prior]])
+    right = np.append(data[:, 0] / noise, 0.0)
+    expected, (square,), *_ = np.linalg.lstsq(design, right)
+    np.testing.assert_allclose(result.parameters, expected, rtol=1e-9)
+    np.testing.assert_allclose(result.cofactor, np.linalg.inv(design.T @ design), rtol=1e-9, atol=1e-15)
+    assert result.redundancy == 12 + 1 - 2
+    assert result.variance_factor == pytest.approx(square / 11, rel=1e-9)
+
+
+def logarithm(beta, points):
+    """ln β = l, which has no value beyond zero: a full step of Newton's from afar leads there."""
+    return np.log(beta[0]) - points, np.full((len(points), 1, 1), 1.0 / beta[0]), -np.ones((len(points), 1, 1))
+
+
+def square_root(beta, points):
+    """√β = l by a triangular matrix, which has no root beyond zero."""
+    root = np.linalg.cholesky(np.array([[beta[0]]]))[0, 0]
+    return root - points, np.full((len(points), 1, 1), 0.5 / root), -np.ones((len(points), 1, 1))
+
+
+@pytest.mark.parametrize(("condition", "measured", "start"), [(logarithm, 0.0, 10.0), (square_root, 0.01, 9.0)])
+def test_a_step_to_where_the_conditions_have_no_value_is_shortened(condition, measured, start):
+    observations = measured + np.array([[1e-3], [-1e-3]])
+    found = gauss_helmert(condition, [start], observations, 1e-6 * np.eye(1))
+    truth = np.exp(measured) if condition is logarithm else measured**2
+    assert found.parameters[0] == pytest.approx(truth, rel=1e-2)
+
+
+def test_conditions_without_a_value_at_the_start_are_refused():
+    with pytest.raises(InputError, match="did not settle"):
+        gauss_helmert(logarithm, [-1.0], np.zeros((2, 1)), np.eye(1))

@@ -8,9 +8,9 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 from scipy.stats import binom
 
-from gfimu import InputError, Recording, calibrate
+from gfimu import CalibrationPoses, InputError, Latitude, RateTable, Recording, calibrate
+from gfimu.array.gravity import EARTH_RATE
 from gfimu.calibration.rate_table import Plateaus, body_axis, find_plateaus, rate_table_gyro
-from gfimu.geometry.gravity import EARTH_RATE
 
 M = np.array([[1.02, 0.004, -0.003], [0.002, 0.98, 0.005], [-0.006, 0.001, 1.01]])
 BIAS = np.array([0.01, -0.02, 0.005])
@@ -147,7 +147,7 @@ def test_plateaus_are_found_and_no_ramp_is():
 def test_from_recordings_to_a_corrected_gyro():
     rng = np.random.default_rng(11)
     x, y, z = (recording(UPRIGHT[name], rng) for name in NAMES)
-    found = calibrate("gyro", x, rate_table=True, also=[y, z])
+    found = calibrate("gyro", x, rate_table=RateTable([y, z]))
     assert np.all(np.abs(found.values - TRUTH) < 5.0 * found.std)
     assert found.method == "gyro-rate-table"
     corrected = found.apply(y)
@@ -161,31 +161,31 @@ def test_readings_without_any_noise_do():
     runs = [recording(UPRIGHT[name], rng, noise=0.0) for name in NAMES]
     for run in runs:
         run.reference["tacho_rad_s"] = np.round(run.reference["tacho_rad_s"], 2)  # as a command is
-    found = calibrate("gyro", runs[0], rate_table=True, also=runs[1:], levelling_std=1e-3)
+    found = calibrate("gyro", runs[0], rate_table=RateTable(runs[1:]), poses=CalibrationPoses(levelling_std_rad=1e-3))
     assert_allclose(found.values, TRUTH, atol=2e-3)
 
 
 def test_axes_given_stand_for_the_mountings():
     rng = np.random.default_rng(12)
     runs = [replace(recording(UPRIGHT[name], rng), metadata={}) for name in NAMES]
-    found = calibrate("gyro", runs[0], rate_table=True, also=runs[1:], table_axes="x,y,z")
+    found = calibrate("gyro", runs[0], rate_table=RateTable(runs[1:], NAMES))
     assert np.all(np.abs(found.values - TRUTH) < 5.0 * found.std)
 
 
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"table_axes": "x,y"}, "2 axes along the table's for 1 recordings"),
-        ({"table_axes": "up"}, "axis 'up' of the gyro"),
-        ({"min_rest": 60.0}, "no stretch of constant rate of 60 s"),
-        ({"latitude": 95.0}, "latitude 95° is outside"),
+        ({"rate_table": RateTable(axes=("x", "y"))}, "2 axes along the table's for 1 recordings"),
+        ({"rate_table": RateTable(axes=("up",))}, "axis 'up' of the gyro"),
+        ({"poses": CalibrationPoses(min_rest_s=60.0)}, "no stretch of constant rate of 60 s"),
+        ({"gravity": Latitude(95.0)}, "latitude 95° is outside"),
         ({"gravity": 9.8}, "are of accelerometers"),
-        ({"levelling_std": float("nan")}, "--levelling-std is nan rad"),
+        ({"poses": CalibrationPoses(levelling_std_rad=float("nan"))}, "--levelling-std is nan rad"),
     ],
 )
 def test_what_does_not_fit_is_refused(options, words):
     with pytest.raises(InputError, match=words):
-        calibrate("gyro", recording(UPRIGHT["z"], np.random.default_rng(1)), rate_table=True, **options)
+        calibrate("gyro", recording(UPRIGHT["z"], np.random.default_rng(1)), **{"rate_table": RateTable(), **options})
 
 
 @pytest.mark.parametrize(("name", "words"), [("tacho_rad_s", "lacks tacho_rad_s"), ("gyro_y_rad_s", "lacks gyro_y_")])
@@ -193,9 +193,9 @@ def test_a_missing_column_is_named(name, words):
     run = recording(UPRIGHT["z"], np.random.default_rng(1))
     run.reference.pop(name)
     with pytest.raises(InputError, match=words):
-        calibrate("gyro", run, rate_table=True)
+        calibrate("gyro", run, rate_table=RateTable())
 
 
 def test_the_table_is_no_part_of_other_methods():
     with pytest.raises(InputError, match="--rate-table, --also and --table-axes are of a gyro"):
-        calibrate("multi-position", recording(UPRIGHT["z"], np.random.default_rng(1)), rate_table=True)
+        calibrate("multi-position", recording(UPRIGHT["z"], np.random.default_rng(1)), rate_table=RateTable())

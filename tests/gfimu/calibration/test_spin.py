@@ -7,14 +7,14 @@ import pytest
 import spin_cases
 from spin_cases import CUBE, ON_ITS_SIDE, Unit, normalised_errors
 
+from gfimu.base.errors import InputError, UnitError
+from gfimu.calibration.certificate.certify import certify
 from gfimu.calibration.error_model import ErrorModel
 from gfimu.calibration.nonlinearity import cubic_std
 from gfimu.calibration.result import Calibration, load_calibration
 from gfimu.calibration.spin import SpinPolicy, spin
 from gfimu.calibration.spin.model import Geometry, SpinGeometry, read_plateaus
 from gfimu.calibration.spin.plateaus import find_plateaus
-from gfimu.certification.certify import certify
-from gfimu.errors import InputError, UnitError
 from gfimu.recording import Recording
 from sim.chips.adxl345 import SensorErrors, SensorSettings
 from sim.scenarios import Scenario

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gfimu.base.errors import InputError
 from gfimu.calibration.imu_tk import read_text_triad
 from gfimu.calibration.methods import calibrate
 from gfimu.calibration.multi_position import multi_position
 from gfimu.calibration.observations import averaged_poses, every_sample
-from gfimu.errors import InputError
 from gfimu.recording.rest import detect_rest
 
 GRAVITY = 9.81744

@@ -7,13 +7,13 @@ import pyarrow.parquet as pq
 import pytest
 
 import gfimu
-from gfimu.commands.campaign_drive import DriveWork
-from gfimu.errors import InputError
+from gfimu.base.errors import InputError
 from sim.rigs.driven import drive
 from sim.scenarios import Scenario
-from sim.sweep.design import Case
-from sim.sweep.engine import run_batch
-from sim.sweep.plan import load_plan
+from sim.trials.campaign.drive import DriveWork
+from sim.trials.sweep.design import Case
+from sim.trials.sweep.engine import run_batch
+from sim.trials.sweep.plan import load_plan
 
 PLAN = """
 kind = "drive"

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from gfimu import AccelerometerArray
-from gfimu.commands.campaign_cases import estimate_case
-from gfimu.commands.campaign_effects import drawn_effects, names_effect
-from gfimu.errors import InputError
+from gfimu.base.errors import InputError
 from sim.scenarios import Scenario
-from sim.sweep.design import Case
+from sim.trials.campaign.cases import estimate_case
+from sim.trials.campaign.effects import drawn_effects, names_effect
+from sim.trials.sweep.design import Case
 
 CUBE = AccelerometerArray.load("cube12")
 SETTING = {"scenario": "paper_run", "duration_s": 6, "calibration": "rest", "method": "integrate"}

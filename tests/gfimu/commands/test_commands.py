@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import gfimu
-from gfimu.errors import InputError
+from gfimu import InputError
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +44,6 @@ def test_estimate_takes_paths_and_objects(made, tmp_path):
         np.testing.assert_array_equal(found.omega, expected.omega)
     np.testing.assert_allclose(gfimu.Estimate.read(tmp_path / "e.csv").omega, expected.omega)
     assert gfimu.estimate(file, position=True).position is not None
-    assert gfimu.estimate(file, with_position=True).position is not None
     rested = gfimu.estimate(file, rest_bias=True)
     assert "rest_bias_m_s2" in rested.metadata
 
@@ -128,7 +127,7 @@ NOTES = [
     "gfimu.diagnosis.verdict.verdict.Diagnosis",
     "gfimu.recording.recording.Recording",
     "RecordingNoise",
-    "gfimu.position_drift.budget.DriftBudget",
+    "gfimu.budget.drift.budget.DriftBudget",
 ]
 
 

@@ -10,15 +10,24 @@ import pytest
 
 import gfimu
 from gfimu.diagnosis.criticism.gain import Gain
-from gfimu.diagnosis.verdict.parts import NamedCause, Residual, Unexplained
+from gfimu.diagnosis.verdict.parts import NamedCause, NoiseLevels, Residual, Unexplained
 from gfimu.diagnosis.verdict.verdict import Diagnosis
-from gfimu.joining import ReferenceSeries
+from gfimu.recording.joining import ReferenceSeries
+from sim.trials.worlds.hidden import Measurement, measure
 from sim.twin import Twin
-from sim.worlds.hidden import Measurement, measure
 
 TWIN = Twin.load("cube12_turntable")
 NOTHING = Diagnosis(
-    "nothing_found", (), Residual(0.1, 0.1, 0.1, {}, {}), Gain(), Unexplained(), (), TWIN, (), ("Nothing.",), {}
+    verdict="nothing_found",
+    causes=(),
+    residual=Residual(0.1, 0.1, 0.1, {}, {}),
+    gain=Gain(),
+    unexplained=Unexplained(),
+    rivals=(),
+    twin=TWIN,
+    runs=(),
+    sentences=("Nothing.",),
+    noise=NoiseLevels(),
 )
 CLOCK_ERROR = NamedCause("clock_error", {"ratio": 0.0035}, {"ratio": 1e-6}, 0.99)
 
@@ -57,9 +66,9 @@ def test_a_rate_error_that_the_diagnosis_names_is_left_in(explained):
     value = used.reference["tacho_rad_s"][later]
     place = int(np.flatnonzero(series.columns["tacho_rad_s"] == value)[0])
     assert read_at[later] == pytest.approx((1.0035 * series.t_s[place] + 3.05) / 1.0035, abs=5e-3)
-    assert found.reference_clock["rate_error"] == pytest.approx(0.0035, abs=3e-4)
+    assert found.reference_clock.rate_error == pytest.approx(0.0035, abs=3e-4)
     assert [cause.effect for cause in found.causes] == ["clock_error"]
-    assert found.causes[0].std["ratio"] >= found.reference_clock["rate_error_std"]
+    assert found.causes[0].std["ratio"] >= found.reference_clock.rate_error_std
 
 
 def test_one_that_it_does_not_name_is_taken_off_and_a_cause(explained):

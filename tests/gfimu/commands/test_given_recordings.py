@@ -5,8 +5,8 @@ import pyarrow as pa
 import pytest
 
 import gfimu
+from gfimu.base.errors import CorruptValueWarning, InputError, UnitError
 from gfimu.commands.opened import as_runs, as_source
-from gfimu.errors import CorruptValueWarning, InputError, UnitError
 
 CUBE = gfimu.AccelerometerArray.load("cube12")
 
@@ -54,7 +54,7 @@ def test_every_command_takes_every_form(run, form, tmp_path):
     poses = gfimu.simulate("calibration_poses", seed=2)
     calibration = gfimu.calibrate("array", forms(poses)[form], **named)
     assert calibration.channels == poses.channels
-    assert gfimu.drift_of_rest(forms(poses.slice(0, 300))[form], time=0.5, lead=0.5, **named).array == "cube12"
+    assert gfimu.drift_of_rest(forms(poses.slice(0, 300))[form], duration=0.5, lead=0.5, **named).array == "cube12"
 
 
 def test_raw_counts_in_a_table_stay_counts_for_a_calibration():
@@ -132,5 +132,5 @@ def test_columns_without_units_are_named_once(run):
 def test_a_foreign_table_is_read_by_a_map(run):
     table = pa.table({"time": run.t_s, "x": run.readings[:, 0], "y": run.readings[:, 1], "z": run.readings[:, 2]})
     changes = ["time.column=time", "unit=m_s2", "channels.a11=x", "channels.a12=y", "channels.a13=z"]
-    found = as_source(table, None, None, changes)
+    found = as_source(table, None, gfimu.load_map(None, changes))
     np.testing.assert_array_equal(found.readings, run.readings[:, :3])

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.linalg import block_diag, cho_factor, cho_solve
 
+from gfimu.array.array import AccelerometerArray
 from gfimu.diagnosis.data.cosine_basis import NoiseLevels
 from gfimu.diagnosis.data.run import prepare_run
 from gfimu.diagnosis.data.stretch import Stretch, make_stretches
@@ -18,12 +19,11 @@ from gfimu.diagnosis.data.table.spins import State
 from gfimu.diagnosis.terms.cause import Cause
 from gfimu.diagnosis.terms.columns import Columns
 from gfimu.diagnosis.terms.drive import Drive
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.world_model import Effect, Spin
+from gfimu.model.world_model import Effect, Spin
 from sim.effects import EFFECTS
 from sim.motions.motion import SpinMotion, SplineSpin
+from sim.trials.worlds.hidden import Measurement, measure
 from sim.twin import Twin
-from sim.worlds.hidden import Measurement, measure
 
 
 def small_twin(array: str = "p2_face_centres", rate: float = 50.0, **changes) -> Twin:

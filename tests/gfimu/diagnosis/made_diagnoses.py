@@ -8,11 +8,11 @@ import numpy as np
 
 from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.criticism.views.run_view import RunView
-from gfimu.diagnosis.verdict.parts import NamedCause, Residual, Rival, Unexplained
+from gfimu.diagnosis.verdict.parts import NamedCause, NoiseLevels, Residual, Rival, Unexplained
 from gfimu.diagnosis.verdict.verdict import Diagnosis
 from sim.effects import Effect, make_effect
+from sim.trials.worlds.hidden import Measurement, measure, random_profile
 from sim.twin import Twin
-from sim.worlds.hidden import Measurement, measure, random_profile
 
 SETTING = Measurement(duration=40.0)
 
@@ -75,16 +75,18 @@ def made_diagnosis(verdict: str = "explained", *, seed: int = 1) -> Diagnosis:
         unexplained = Unexplained(True, "once per revolution in a11 and a12", 240.0, {"a11_m_s2: cos θ": 0.02})
     rivals = (Rival(("axis_wobble",), -120.0, "its inertial part at high rate is not in the data"),)
     return Diagnosis(
-        verdict,
-        causes,
-        _residual(run, twin.array.channels),
-        Gain("stretches of the recording", 0.04, 0.029, 0.99, 1.1, 0.05, 0.03, 0.01, 0.5, 0.1) if effects else Gain(),
-        unexplained,
-        rivals if causes else (),
-        twin.extended([tilt]) if verdict == "explained" else twin,
-        (run,),
-        ("The table's axis is not vertical.",) if causes else ("Nothing found.",),
-        {"white_over_data_sheet": 1.0, "bias_instability_m_s2": 0.0015, "reference_white": 0.02},
+        verdict=verdict,
+        causes=causes,
+        residual=_residual(run, twin.array.channels),
+        gain=Gain("stretches of the recording", 0.04, 0.029, 0.99, 1.1, 0.05, 0.03, 0.01, 0.5, 0.1)
+        if effects
+        else Gain(),
+        unexplained=unexplained,
+        rivals=rivals if causes else (),
+        twin=twin.extended([tilt]) if verdict == "explained" else twin,
+        runs=(run,),
+        sentences=("The table's axis is not vertical.",) if causes else ("Nothing found.",),
+        noise=NoiseLevels(white_over_data_sheet=1.0, bias_instability_m_s2=0.0015, reference_white=0.02),
     )
 
 

@@ -5,37 +5,39 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from gfimu.array.array import AccelerometerArray
 from gfimu.diagnosis import diagnose
 from gfimu.diagnosis.criticism import holdout
 from gfimu.diagnosis.data.stretch import make_stretches
 from gfimu.diagnosis.diagnose import prepare
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.nuisance_models import understand
-from gfimu.geometry.array import AccelerometerArray
 from sim.effects import EFFECTS, make_effect
-from sim.study.cases import Case, study_cases
-from sim.study.outcome import draw_world
+from sim.trials.study.cases import Case, study_cases
+from sim.trials.study.outcome import draw_world
+from sim.trials.worlds.hidden import Measurement, measure
 from sim.twin import Twin
-from sim.worlds.hidden import Measurement, measure
 
 TWIN = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
 CORRECTED = {name for name, family in EFFECTS.items() if getattr(family, "tolerance", 0.0) > 0.0}
 """Effects of which a good calibration leaves something."""
 
 
+@pytest.mark.study
 def test_a_residue_alone_is_no_cause_and_is_reported():
     world = draw_world(Case("reduced", 700, residue=True, duration=20.0))
     found = diagnose([world.recording], world.twin)
     assert found.verdict == "nothing_found", found
-    assert found.noise["calibration_residue"] == 1.0
+    assert found.noise.calibration_residue == 1.0
     assert any("calibration is a little off" in sentence for sentence in found.sentences)
     corrections = {effect.name for effect in found.twin.effects}
     assert corrections == CORRECTED
     again = diagnose([world.recording], found.twin)
     assert again.verdict == "nothing_found"
-    assert again.noise["calibration_residue"] == 0.0
+    assert again.noise.calibration_residue == 0.0
 
 
+@pytest.mark.study
 def test_a_cause_beside_a_residue_is_named_alone():
     world = draw_world(Case("reduced", 701, ("clock_error",), 1500.0, residue=True, duration=20.0))
     found = diagnose([world.recording], world.twin)
@@ -45,6 +47,7 @@ def test_a_cause_beside_a_residue_is_named_alone():
     assert abs(cause.parameters["ratio"] - truth["ratio"]) < 4 * cause.std["ratio"]
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("residue", [True, False])
 def test_a_residue_is_admitted_beside_a_cause_where_there_is_one(residue):
     world = draw_world(Case("reduced", 702, ("tacho_latency",), 1500.0, residue=residue, duration=20.0))
@@ -53,12 +56,14 @@ def test_a_residue_is_admitted_beside_a_cause_where_there_is_one(residue):
     assert (found.residue > 0.0) == residue
 
 
+@pytest.mark.study
 def test_two_causes_are_not_taken_for_a_residue():
     world = draw_world(Case("reduced", 703, ("eccentricity", "clock_error"), 1000.0, duration=20.0))
     found = diagnose([world.recording], world.twin)
     assert {cause.effect for cause in found.causes} == {"eccentricity", "clock_error"}
 
 
+@pytest.mark.study
 def test_a_mode_beside_a_residue_is_named_alone():
     world = draw_world(Case("reduced", 701, ("resonance",), 1500.0, residue=True, duration=14.0))
     found = diagnose([world.recording], world.twin)
@@ -68,16 +73,18 @@ def test_a_mode_beside_a_residue_is_named_alone():
     assert found.causes[0].parameters["frequency_hz"] == pytest.approx(truth["frequency_hz"], rel=0.02)
 
 
+@pytest.mark.study
 def test_a_single_small_error_is_not_called_a_residue():
     recording = measure(
         np.random.default_rng(5), TWIN, [make_effect("bias", {"a21_m_s2": 0.02})], Measurement(duration=20.0)
     )
     found = diagnose([recording], TWIN)
-    assert found.noise["calibration_residue"] == 0.0
+    assert found.noise.calibration_residue == 0.0
     assert "bias" in {cause.effect for cause in found.causes}
     assert not any("calibrate the unit" in cause.why for cause in found.causes)
 
 
+@pytest.mark.study
 def test_a_cause_that_a_residue_would_replace_as_well_is_not_certain():
     """Small errors of all numbers and strong bias instability: one effect alone is as probable as all together."""
     case = next(one for one in study_cases("residue") if one.seed == 50002)
@@ -88,6 +95,7 @@ def test_a_cause_that_a_residue_would_replace_as_well_is_not_certain():
         assert "calibrate the unit" in cause.why
 
 
+@pytest.mark.study
 def test_the_gain_of_a_residue_is_that_of_the_part_it_was_not_fitted_to(monkeypatch):
     measured = holdout.measure
     seen = []

@@ -1,52 +1,110 @@
-"""A search that is interrupted gives what is known by then."""
+"""A diagnosis that is interrupted, or out of time, gives what is known by then, and its workers end with it."""
+
+import time
+from importlib import import_module
 
 import numpy as np
 import pytest
 
+import gfimu
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import InputError
 from gfimu.diagnosis import diagnose
-from gfimu.diagnosis.report.plain_words import headline
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.diagnosis.report.plain_words import headline, next_steps
+from gfimu.diagnosis.time_limit import limited_to
 from sim.effects import make_effect
+from sim.trials.worlds.hidden import Measurement, measure
 from sim.twin import Twin
-from sim.worlds.hidden import Measurement, measure
 
 TWIN = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
 RUN = measure(
     np.random.default_rng(4),
     TWIN,
     [make_effect("table_tilt", {"x_rad": 0.01, "y_rad": 0.0})],
-    Measurement(duration=20.0),
+    Measurement(duration=12.0),
 )
+STAGES = ["samples", "search", "lack of fit", "validation", "wider library", "place"]
 
 
-def interrupting(text):
-    """A report that interrupts as soon as the search says a text; and what it said."""
+def interrupting(text, *words):
+    """A report that interrupts once, as soon as the search says a text; and what it said."""
     said = []
 
-    def report(share, words):
-        said.append(words)
-        if text in words:
-            raise KeyboardInterrupt
+    def report(share, line):
+        first = not any(text in one for one in said)
+        said.append(line)
+        if text in line and first:
+            raise KeyboardInterrupt(*words)
 
     return report, said
 
 
-def test_an_interrupt_gives_the_leading_explanation():
-    report, said = interrupting("leading")
+@pytest.mark.parametrize(
+    ("text", "stage", "leads"),
+    [("drive", "search", False), ("leading", "search", True), ("hold out", "validation", True)],
+)
+def test_an_interrupt_gives_what_is_known(text, stage, leads):
+    report, said = interrupting(text)
     found = diagnose([RUN], TWIN, report=report)
     assert said[-1] == "interrupted"
-    assert any(words.endswith("leading: table_tilt") for words in said)
     assert found.verdict == "unknown"  # nothing was criticised
     assert not found.causes
-    assert found.sentences[0].startswith("No verdict: the search was interrupted")
+    assert found.sentences[0].startswith(f"No verdict: the {stage} was interrupted (Ctrl-C)")
     assert headline(found) == found.sentences[0]
-    assert "table_tilt (x_rad = 0.00" in found.unexplained.signature
+    assert ("table_tilt (x_rad = 0.0" in found.unexplained.signature) is leads
     assert not found.gain.held_out
     assert not found.twin.effects
+    assert not found.rivals
+    assert found.residual.rms_before > found.residual.noise_floor
+    place = STAGES.index(stage)
+    expected = {"by": "Ctrl-C", "stage": stage, "done": STAGES[:place], "not_done": STAGES[place:]}
+    assert found.to_dict()["interrupted"] == expected
+    assert "--time-limit" in next_steps(found)[0]
 
 
-@pytest.mark.parametrize("when", ["drive", "search"])
-def test_an_interrupt_before_anything_is_known_ends_the_diagnosis(when):
-    report, _ = interrupting(when)
-    with pytest.raises(KeyboardInterrupt):
-        diagnose([RUN], TWIN, report=report)
+def test_a_verdict_stands_when_the_wider_library_is_interrupted(monkeypatch):
+    monkeypatch.setattr("gfimu.diagnosis.one_library.LibraryDiagnosis.promise", lambda *_: 100.0)
+    report, _ = interrupting("wider library", "SIGTERM")
+    found = diagnose([RUN], TWIN, report=report)
+    assert found.verdict == "explained"
+    assert [cause.effect for cause in found.causes] == ["table_tilt"]
+    assert found.to_dict()["interrupted"] == {
+        "by": "SIGTERM",
+        "stage": "wider library",
+        "done": STAGES[:-2],
+        "not_done": STAGES[-2:],
+    }
+    assert found.sentences[-1].endswith("Not done: wider library, place.")
+
+
+def test_a_verdict_stands_when_its_place_is_not_looked_for_any_more(monkeypatch):
+    def with_place(*_):
+        raise KeyboardInterrupt("time limit")
+
+    monkeypatch.setattr(import_module("gfimu.diagnosis.diagnose"), "with_place", with_place)
+    found = diagnose([RUN], TWIN)
+    assert found.verdict == "explained"
+    assert (found.interrupted.by, found.interrupted.not_done) == ("time limit", ("place",))
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_the_time_limit_ends_a_search_in_processes_too(monkeypatch, workers):
+    monkeypatch.setattr("gfimu.diagnosis.fit.parallel._processors", lambda: workers)
+    began = time.monotonic()
+    with limited_to(1.5):
+        found = diagnose([RUN], TWIN)
+    assert time.monotonic() - began < 1.5 + 10.0  # a slow machine's
+    assert found.interrupted.by == "time limit"
+    assert found.verdict == "unknown"
+    assert diagnose([RUN], TWIN, report=interrupting("drive")[0]).interrupted.by == "Ctrl-C"  # no limit is left
+
+
+def test_a_diagnosis_within_its_time_is_whole():
+    found = gfimu.diagnose(RUN, TWIN, time_limit=500.0)
+    assert (found.verdict, found.interrupted, found.to_dict()["interrupted"]) == ("explained", None, None)
+
+
+@pytest.mark.parametrize("limit", [0.0, -1.0, float("nan")])
+def test_a_limit_without_time_is_refused(limit):
+    with pytest.raises(InputError, match=r"time limit is .* above zero"):
+        gfimu.diagnose(RUN, TWIN, time_limit=limit)

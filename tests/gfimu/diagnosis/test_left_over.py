@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from usual_twin import UsualTwin
 
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.diagnosis import diagnose
 from gfimu.diagnosis.criticism.series_tests import lines
 from gfimu.diagnosis.data.stretch import make_stretches
@@ -15,12 +17,10 @@ from gfimu.diagnosis.diagnose import prepare
 from gfimu.diagnosis.fit.learn import starting_point
 from gfimu.diagnosis.fit.observed_at import observed_at
 from gfimu.diagnosis.policy import Policy
-from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
-from gfimu.units import STANDARD_GRAVITY
 from sim.effects import make_effect
+from sim.trials.worlds.hidden import Measurement, measure
 from sim.twin import Twin
-from sim.worlds.hidden import Measurement, measure
 
 SETTING = Measurement(duration=24.0)
 CHANNEL = "a12"
@@ -39,6 +39,7 @@ def recorded(twin, seed, change, effects=()):
     return Recording.from_arrays(run.t_s, readings, twin.array, reference=run.reference)
 
 
+@pytest.mark.study
 def test_a_jump_is_told_by_channel_time_and_size(twin):
     place = twin.array.channels.index(CHANNEL)
 
@@ -53,6 +54,7 @@ def test_a_jump_is_told_by_channel_time_and_size(twin):
     assert float(told[2]) == pytest.approx(9.7, abs=0.3)
 
 
+@pytest.mark.study
 def test_a_cubic_is_not_a_scale_factor_and_a_quadratic(twin):
     place = twin.array.channels.index(CHANNEL)
 
@@ -66,6 +68,7 @@ def test_a_cubic_is_not_a_scale_factor_and_a_quadratic(twin):
     assert size / STANDARD_GRAVITY**3 == pytest.approx(3e-4, rel=0.1)  # of the reading in units of gravity
 
 
+@pytest.mark.study
 def test_a_scale_factor_and_a_quadratic_are_no_cubic(twin):
     hidden = [
         make_effect("scale_factor", {CHANNEL: 0.02}, twin.array),
@@ -93,6 +96,7 @@ def test_a_line_far_beyond_the_smallest_probability_has_finite_odds(twin):
     assert "tone at 11.0" in found.signature
 
 
+@pytest.mark.study
 def test_a_walk_beside_strong_bias_instability_is_no_warm_up():
     twin = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
     unstable = Measurement(duration=30.0, bias_instability=0.5e-3 * 9.80665)
@@ -103,6 +107,7 @@ def test_a_walk_beside_strong_bias_instability_is_no_warm_up():
     assert abs(cause.parameters["strength_m_s2_rts"] - 0.02) < 3 * cause.std["strength_m_s2_rts"]
 
 
+@pytest.mark.study
 def test_a_few_wandering_channels_are_no_walk_of_all(twin):
     rng = np.random.default_rng(8)
 
@@ -113,6 +118,7 @@ def test_a_few_wandering_channels_are_no_walk_of_all(twin):
     assert "bias_random_walk" not in [cause.effect for cause in found.causes]
 
 
+@pytest.mark.study
 def test_what_a_large_cause_leaves_widens_its_uncertainty_and_is_told(twin):
     hidden = make_effect("eccentricity", {"x_m": 0.03, "y_m": -0.02})
     place = twin.array.channels.index(CHANNEL)

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 import gfimu
+from gfimu.base.errors import InputError
 from gfimu.diagnosis.design.run_check import check_runs
 from gfimu.diagnosis.diagnose import prepare
 from gfimu.diagnosis.fit.learn import starting_point
 from gfimu.diagnosis.one_library import stretches_of
 from gfimu.diagnosis.policy import Policy
-from gfimu.errors import InputError
 from sim.effects import make_effect
 from sim.scenarios import Scenario
 from sim.twin import Twin
@@ -47,6 +47,7 @@ def test_a_table_keeps_even_knots_as_its_tachometer_may_be_wrong_where_it_is_fas
     assert not drive.spline.halvings
 
 
+@pytest.mark.study
 def test_a_turned_mounting_is_found():
     hidden = {"x_rad": 0.03, "y_rad": -0.05, "z_rad": 0.06}
     verdict = gfimu.diagnose(recorded("mount_turn", hidden), "linear_axis")
@@ -67,6 +68,6 @@ def test_a_check_gives_speeds_in_metres_and_asks_for_no_turns():
     twin = Twin.load("linear_axis")
     found = check_runs([recorded()], twin, ["run"])
     facts = found.runs[0]
-    assert 0.05 < facts["fastest_m_s"] < 0.25
-    assert "turns" not in facts
+    assert 0.05 < facts.fastest_m_s < 0.25
+    assert facts.turns is None
     assert not any("turn" in line.split(":")[0] for line in found.advice if "whole" in line)

@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 from usual_twin import UsualTwin
 
+from gfimu.array.array import AccelerometerArray
 from gfimu.diagnosis import diagnose
 from gfimu.diagnosis.data import stretch
 from gfimu.diagnosis.data.run import prepare_run
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search import long_run
 from gfimu.diagnosis.search.long_run import spread_over_runs, understand_any_length
-from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
 from sim.effects import make_effect
+from sim.trials.worlds.hidden import Measurement, measure, random_profile
 from sim.twin import Twin
-from sim.worlds.hidden import Measurement, measure, random_profile
 
 FEW = Policy(most_searched=2)
 
@@ -52,6 +52,7 @@ def counting(monkeypatch):
     return searched
 
 
+@pytest.mark.study
 def test_a_cause_found_in_part_is_measured_on_all(short_stretches, monkeypatch):
     twin = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
     hidden = make_effect("table_tilt", {"x_rad": 2e-3, "y_rad": -1e-3})
@@ -68,12 +69,14 @@ def test_a_cause_found_in_part_is_measured_on_all(short_stretches, monkeypatch):
         assert other.parameters[key] == pytest.approx(one.parameters[key], abs=0.5 * std)
 
 
+@pytest.mark.study
 def test_nothing_is_found_in_a_long_quiet_recording(short_stretches):
     twin = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
     recording = measure(np.random.default_rng(12), twin, [], Measurement(duration=30.0))
     assert diagnose([recording], twin, policy=FEW).verdict == "nothing_found"
 
 
+@pytest.mark.study
 def test_what_has_no_name_is_described_on_some_stretches_and_fitted_to_all(short_stretches):
     twin = UsualTwin(array=AccelerometerArray.load("cube12"), array_name="cube12")
     rng = np.random.default_rng(13)
@@ -88,6 +91,7 @@ def test_what_has_no_name_is_described_on_some_stretches_and_fitted_to_all(short
     assert found.gain.share_of_excess_removed > 0.9
 
 
+@pytest.mark.study
 def test_every_run_of_a_long_recording_has_the_noise_of_its_own_reference(short_stretches, monkeypatch):
     twin = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
     rng = np.random.default_rng(14)

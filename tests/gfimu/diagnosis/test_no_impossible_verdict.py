@@ -9,6 +9,8 @@ import pytest
 from made_diagnoses import made_diagnosis
 from usual_twin import UsualTwin
 
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import InputError
 from gfimu.diagnosis import diagnose
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.report.page import report_html
@@ -16,13 +18,11 @@ from gfimu.diagnosis.report.plain_words import headline
 from gfimu.diagnosis.verdict.naming import capped
 from gfimu.diagnosis.verdict.parts import NamedCause
 from gfimu.diagnosis.verdict.wording import verdict_sentences
-from gfimu.errors import InputError
-from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
 from sim.effects import make_effect
-from sim.study.cases import study_cases
-from sim.study.outcome import draw_world
-from sim.worlds.hidden import Measurement, measure, random_profile
+from sim.trials.study.cases import study_cases
+from sim.trials.study.outcome import draw_world
+from sim.trials.worlds.hidden import Measurement, measure, random_profile
 
 SETTING = Measurement(duration=24.0)
 
@@ -52,6 +52,7 @@ def test_a_frequency_that_is_known_makes_no_mode_certain():
     assert capped(mode, Policy(), {"frequency_hz": 24.5}).probability == 0.9
 
 
+@pytest.mark.study
 def test_causes_that_explain_in_part_say_so_everywhere():
     whole = made_diagnosis("explained")
     part = replace(whole, gain=replace(whole.gain, share_of_excess_removed=0.67))
@@ -66,6 +67,7 @@ def test_causes_that_explain_in_part_say_so_everywhere():
     assert any("so much more than on validation data" in sentence for sentence in told)
 
 
+@pytest.mark.study
 def test_a_verdict_that_does_not_predict_unseen_data_is_unknown():
     # A place of the chips, taken out of the library, that gains imitate in the whole run but not in its parts.
     case = next(case for case in study_cases("left_out") if case.key == "left_out/80012")
@@ -76,6 +78,7 @@ def test_a_verdict_that_does_not_predict_unseen_data_is_unknown():
     assert not any(effect.name == "scale_factor" for effect in found.twin.effects)
 
 
+@pytest.mark.study
 def test_gains_that_no_part_has_are_told_as_a_wrong_file(twin):
     gains = make_effect("scale_factor", dict.fromkeys(twin.array.channels[:3], 0.4))
     run = measure(np.random.default_rng(7), twin, [gains], SETTING)
@@ -85,6 +88,7 @@ def test_gains_that_no_part_has_are_told_as_a_wrong_file(twin):
     assert not found.twin.effects
 
 
+@pytest.mark.study
 def test_one_channel_with_far_more_slow_noise_is_told(twin):
     rng = np.random.default_rng(12)
     motion = random_profile(rng, SETTING.duration)
@@ -97,15 +101,15 @@ def test_one_channel_with_far_more_slow_noise_is_told(twin):
     channel = twin.array.channels.index("a22")
     readings[:, channel] += 0.1 * slow
     loud = diagnose([Recording.from_arrays(run.t_s, readings, twin.array, reference=run.reference)], twin)
-    assert loud.noise["bias_instability_largest_channel"] == "a22"
-    assert loud.noise["bias_instability_largest_m_s2"] > 4 * loud.noise["bias_instability_m_s2"]
+    assert loud.noise.bias_instability_largest_channel == "a22"
+    assert loud.noise.bias_instability_largest_m_s2 > 4 * loud.noise.bias_instability_m_s2
     assert loud.verdict == "unknown"
     assert "the bias instability of channel a22 is" in loud.unexplained.signature
     assert any("The largest bias instability is that of channel a22" in sentence for sentence in loud.sentences)
     assert "bias instability largest channel a22" in report_html(loud)
     quiet = diagnose([run], twin)
     assert quiet.verdict == "nothing_found"
-    assert quiet.noise["bias_instability_largest_m_s2"] < 4 * quiet.noise["bias_instability_m_s2"]
+    assert quiet.noise.bias_instability_largest_m_s2 < 4 * quiet.noise.bias_instability_m_s2
 
 
 class Singular:
@@ -115,6 +119,7 @@ class Singular:
         raise np.linalg.LinAlgError("Eigenvalues did not converge")
 
 
+@pytest.mark.study
 def test_causes_that_cannot_be_judged_on_held_out_data_do_not_stand(twin, monkeypatch):
     tilted = make_effect("mount_tilt", {"x_rad": 0.01, "y_rad": 0.0})
     run = measure(np.random.default_rng(3), twin, [tilted], Measurement(duration=12.0))

@@ -17,6 +17,7 @@ def found(scenario, twin, hidden="", parameters=None, changes=()):
     return gfimu.diagnose(gfimu.simulate(run, seed=5), twin)
 
 
+@pytest.mark.study
 def test_the_zero_of_a_pendulum_s_encoder_is_found():
     verdict = found("pendulum", "pendulum", "angle_zero", {"offset_rad": 0.01}, ["duration_s=24"])
     assert [cause.effect for cause in verdict.causes] == ["angle_zero"]
@@ -31,6 +32,7 @@ def test_a_gain_is_found_on_a_level_axis_with_a_tachometer():
     assert verdict.causes[0].parameters["a11"] == pytest.approx(0.02, abs=2e-3)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("side", [0.003, -0.002])
 def test_a_lever_of_a_wheel_is_found_beside_the_gain_that_can_do_the_same(side):
     verdict = found("wheel", "wheel_pair", "sensor_position", {"a2_x_m": side})

@@ -10,11 +10,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from every_item import every
 from scipy.stats import norm
 
 import gfimu.diagnosis
+from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.diagnosis.policy import Policy
-from gfimu.units import STANDARD_GRAVITY
 
 FOLDER = Path(gfimu.diagnosis.__file__).parent
 FIELDS = [one.name for one in dataclasses.fields(Policy)]
@@ -35,7 +36,7 @@ def test_every_field_is_documented_in_order():
     assert list(entries()) == FIELDS
 
 
-@pytest.mark.parametrize("name", FIELDS)
+@every("name", FIELDS)
 def test_every_field_has_its_unit_its_meaning_and_what_set_it(name):
     kind, text = entries()[name]
     assert kind.startswith(type(getattr(Policy, name)).__name__)

@@ -8,14 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import InputError
 from gfimu.diagnosis import diagnose
 from gfimu.diagnosis.data.run import prepare_run
-from gfimu.errors import InputError
-from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
 from sim.effects import EFFECTS, ENCODER_EFFECTS, NOT_OF_AN_ENCODER, Effect
+from sim.trials.worlds.hidden import Measurement, hidden_effect, measure, random_profile
 from sim.twin import Twin
-from sim.worlds.hidden import Measurement, hidden_effect, measure, random_profile
 
 SETTING = Measurement(duration=26.0)
 TURN = 2 * np.pi
@@ -46,6 +46,7 @@ def recorded(twin, seed, source, reference, name=None, size=300.0):
     return recording, replace(twin, drive_source=source)
 
 
+@pytest.mark.study(but=["inf"])
 @pytest.mark.parametrize("counts", [63, np.inf])
 def test_an_encoder_with_nothing_hidden(twin, counts):
     step = TURN / counts
@@ -53,6 +54,7 @@ def test_an_encoder_with_nothing_hidden(twin, counts):
     assert found.verdict == "nothing_found", (found.causes, found.unexplained.signature)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("name", ["table_tilt", "tacho_latency", "clock_error"])
 def test_an_encoder_finds_what_is_hidden(twin, name):
     step = TURN / 4096
@@ -61,6 +63,7 @@ def test_an_encoder_finds_what_is_hidden(twin, name):
     assert found.gain.share_of_excess_removed > 0.97
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("step", [0.2])
 def test_a_coarse_tachometer_with_nothing_hidden(twin, step):
     found = diagnose(*one(recorded(twin, 901, "tacho", lambda spin, t, tacho: np.round(tacho / step) * step)))
@@ -72,6 +75,7 @@ def test_a_command_that_is_followed_exactly(twin):
     assert found.verdict == "nothing_found", (found.causes, found.unexplained.signature)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(("start", "stop"), [(0.0, 9.0), (10.0, 18.0)])
 def test_a_reference_that_fails_for_long(twin, start, stop):
     def failing(spin, t, tacho):
@@ -110,6 +114,7 @@ class WithoutRipple(Twin):
         return {name: family for name, family in super().families().items() if name != "tacho_ripple"}
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("size", [60.0])
 def test_what_only_the_reference_shows_is_told_of_it(size):
     blind = WithoutRipple(array=AccelerometerArray.load("cube12"), array_name="cube12")
@@ -119,6 +124,7 @@ def test_what_only_the_reference_shows_is_told_of_it(size):
     assert "the reference" in found.unexplained.signature
 
 
+@pytest.mark.study
 def test_a_wandering_zero_of_the_tachometer_is_told_of_the_reference(twin):
     def wandering(spin, t, tacho):
         return tacho + 0.015 * np.cos(TURN * 2.5 * t / SETTING.duration)

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.diagnosis import diagnose
 from gfimu.diagnosis.criticism.holdout import split
 from gfimu.diagnosis.data.integrity import check_integrity
@@ -16,13 +18,11 @@ from gfimu.diagnosis.data.stretch import make_stretches
 from gfimu.diagnosis.fit.gauss_newton import fit
 from gfimu.diagnosis.fit.learn import predicted_by_reference, starting_point
 from gfimu.diagnosis.policy import Policy
-from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
-from gfimu.units import STANDARD_GRAVITY
 from sim.effects import make_effect
 from sim.motions.profiles import Hold, Ramp, spin_profile
+from sim.trials.worlds.hidden import Measurement, hidden_effect, measure, random_profile
 from sim.twin import Twin
-from sim.worlds.hidden import Measurement, hidden_effect, measure, random_profile
 
 SETTING = Measurement(duration=24.0)
 
@@ -43,6 +43,7 @@ def with_tacho(recording, array, tacho):
     )
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("held", [False, True], ids=["left out", "held"])
 def test_a_tachometer_at_a_quarter_of_the_rate_is_no_discrepancy(twin, quiet, held):
     tacho = quiet.reference["tacho_rad_s"]
@@ -52,7 +53,7 @@ def test_a_tachometer_at_a_quarter_of_the_rate_is_no_discrepancy(twin, quiet, he
     assert_allclose(run.reference_valid, place % 4 == 0)
     found = diagnose([with_tacho(quiet, twin.array, slow)], twin)
     assert found.verdict == "nothing_found"
-    assert found.noise["reference_white"] == pytest.approx(0.02, rel=0.2)
+    assert found.noise.reference_white == pytest.approx(0.02, rel=0.2)
 
 
 def test_a_coarse_tachometer_keeps_its_equal_values(twin, quiet):
@@ -80,6 +81,7 @@ def test_a_stretch_keeps_the_time_origin_of_its_run(twin, quiet, name):
             assert_allclose(block.predict([effect], drive.spin), whole[rows], atol=0.01)
 
 
+@pytest.mark.study
 def test_held_out_blocks_are_predicted_to_the_noise(twin):
     effect = make_effect("channel_skew", {"per_chip_s": -0.04}, twin.array)
     found = diagnose([measure(np.random.default_rng(8), twin, [effect], SETTING)], twin)
@@ -96,6 +98,7 @@ def test_a_chip_at_twice_its_gain_is_not_taken_for_clipping(twin):
     assert [found.name for found in checked.effects] == ["wrong_range"]
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(
     ("name", "key", "value"), [("channel_skew", "per_chip_s", -0.15), ("clock_error", "ratio", -0.05)]
 )
@@ -107,6 +110,7 @@ def test_a_large_fault_of_timing_is_found_though_far_from_linear(twin, name, key
     assert abs(cause.parameters[key] - value) < 4 * cause.std[key]
 
 
+@pytest.mark.study
 def test_a_slow_clock_asks_for_the_motion_beyond_the_end(twin):
     # The last readings are of 0.9 s after the last of the reference, while the table turns ever faster.
     effect = make_effect("clock_error", {"ratio": -0.03}, twin.array)
@@ -122,6 +126,7 @@ def test_a_slow_clock_asks_for_the_motion_beyond_the_end(twin):
     assert diagnose([recording], replace(twin, effects=(effect,))).verdict == "nothing_found"
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("name", ["eccentricity", "bias"])
 def test_a_recording_kept_for_the_gate_confirms_the_cause(twin, name):
     rng = np.random.default_rng(11)
@@ -134,6 +139,7 @@ def test_a_recording_kept_for_the_gate_confirms_the_cause(twin, name):
     assert found.gain.share_of_excess_removed > 0.97
 
 
+@pytest.mark.study
 def test_a_large_bias_under_strong_slow_noise_passes_the_gate(twin):
     # Bias instability of 0.5 mg: every short block alone would count the slow noise as its own repetition of the bias.
     rng = np.random.default_rng(12)

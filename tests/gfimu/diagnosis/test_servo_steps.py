@@ -7,12 +7,12 @@ late.
 import numpy as np
 import pytest
 
+from gfimu.array.array import AccelerometerArray
 from gfimu.diagnosis import diagnose
-from gfimu.geometry.array import AccelerometerArray
 from sim.effects import make_effect
 from sim.motions.motion import SpinState, SplineSpin
+from sim.trials.worlds.hidden import Measurement, measure
 from sim.twin import Twin
-from sim.worlds.hidden import Measurement, measure
 
 DURATION = 14.0
 
@@ -39,6 +39,7 @@ def mounted(x_m):
     return Twin(array=AccelerometerArray.load("cube12"), array_name="cube12", cube_offset=np.array([x_m, -0.05, 0.06]))
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(
     ("sample_rate", "hidden"),
     [
@@ -61,6 +62,7 @@ def test_corners_of_the_drive_are_no_lag(sample_rate, hidden):
             assert abs(cause.parameters[key] - value) < 4 * cause.std[key]
 
 
+@pytest.mark.study
 def test_a_recording_held_out_may_have_corners_too():
     """Its drive is as free as that of the recording that was fitted."""
     rng = np.random.default_rng(8)

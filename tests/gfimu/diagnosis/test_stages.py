@@ -7,10 +7,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from gfimu.array.array import AccelerometerArray
 from gfimu.diagnosis import diagnose
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.diagnosis.verdict.parts import NamedCause
+from sim.trials.worlds.hidden import Measurement, measure
 from sim.twin import Twin
-from sim.worlds.hidden import Measurement, measure
 
 TWIN = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
 
@@ -27,8 +28,11 @@ def verdict(clean, kind, *, probability=np.nan, removed=np.nan):
     return replace(clean[1], verdict=kind, library_probability=probability, gain=gain, sentences=(kind,))
 
 
-def given(monkeypatch, clean, usual, wider):
-    """Return the verdict that is given if the libraries say so, and the nuisance models that the wider one searched."""
+def given(monkeypatch, clean, usual, wider, *, promise=10.0, gain=10.0):
+    """Return the verdict that is given if the libraries say so, and the nuisance models that the wider one searched.
+
+    The wider library promises so many nats before its search, and gains so many.
+    """
     asked = []
 
     class Library:
@@ -37,7 +41,13 @@ def given(monkeypatch, clean, usual, wider):
 
         def understood(self, models=None):
             asked.append(models)
-            return SimpleNamespace(explanation=SimpleNamespace(interrupted=False), model="random walk")
+            search = SimpleNamespace(interrupted="")
+            return SimpleNamespace(explanation=search, model="random walk", log_posterior=gain * self._is_wide)
+
+        def promise(self, understanding, others):
+            assert "cubic" in others
+            assert "bias" not in others
+            return promise
 
         def verdict(self, understanding):
             return wider if self._is_wide else usual
@@ -47,25 +57,30 @@ def given(monkeypatch, clean, usual, wider):
 
 
 @pytest.mark.parametrize(
-    ("usual", "wider", "chosen"),
+    ("usual", "wider", "gain", "rare", "chosen"),
     [
-        (("unknown", {}), ("explained", {"probability": 0.5}), "explained"),
-        (("unknown", {"removed": 0.4}), ("unknown", {"removed": 0.7}), "wider unknown"),
-        (("unknown", {"removed": 0.7}), ("unknown", {"removed": 0.4}), "usual unknown"),
-        (("unknown", {}), ("nothing_found", {}), "usual unknown"),
-        (("explained", {"probability": 0.6}), ("explained", {"probability": 0.9}), "wider explained"),
-        (("explained", {"probability": 0.6}), ("unknown", {"removed": 1.0}), "usual explained"),
+        (("unknown", {}), ("explained", {"probability": 0.5}), -50.0, "cubic", "explained"),
+        (("unknown", {"removed": 0.4}), ("unknown", {"removed": 0.7}), 0.0, "cubic", "wider unknown"),
+        (("unknown", {"removed": 0.7}), ("unknown", {"removed": 0.4}), 50.0, "cubic", "usual unknown"),
+        (("unknown", {}), ("nothing_found", {}), 50.0, "cubic", "usual unknown"),
+        (("explained", {"probability": 0.9}), ("explained", {"probability": 0.6}), 2.5, "cubic", "wider explained"),
+        (("explained", {"probability": 0.6}), ("explained", {"probability": 0.9}), 1.5, "cubic", "usual explained"),
+        (("explained", {"probability": 0.6}), ("unknown", {"removed": 1.0}), 50.0, "cubic", "usual explained"),
+        (("nothing_found", {}), ("explained", {"probability": 0.9}), 5.0, "cubic", "wider explained"),
+        (("explained", {}), ("explained", {}), 5.0, "bias", "usual explained"),  # what is rare was withdrawn
     ],
 )
-def test_the_verdict_that_answers_better_is_given(monkeypatch, clean, usual, wider, chosen):
+def test_the_verdict_of_the_greater_evidence_is_given(monkeypatch, clean, usual, wider, gain, rare, chosen):
     one = replace(verdict(clean, usual[0], **usual[1]), sentences=(f"usual {usual[0]}",))
     other = replace(verdict(clean, wider[0], **wider[1]), sentences=(f"wider {wider[0]}",))
-    said, asked = given(monkeypatch, clean, one, other)
+    other = replace(other, causes=(NamedCause(rare, {}, {}, 0.9),))
+    said, asked = given(monkeypatch, clean, one, other, gain=gain)
     assert said.endswith(chosen)
     assert asked == [None, {"random walk"}]
 
 
-@pytest.mark.parametrize("usual", [("nothing_found", {}), ("explained", {"probability": 0.85})])
-def test_what_is_rare_is_not_searched_where_the_usual_effects_answer(monkeypatch, clean, usual):
-    _, asked = given(monkeypatch, clean, verdict(clean, usual[0], **usual[1]), verdict(clean, "explained"))
-    assert asked == [None]
+@pytest.mark.parametrize("usual", ["nothing_found", "explained"])
+@pytest.mark.parametrize(("promise", "searched"), [(-1.1, False), (-0.9, True)])
+def test_what_is_rare_is_searched_where_it_may_be_more_probable(monkeypatch, clean, usual, promise, searched):
+    _, asked = given(monkeypatch, clean, verdict(clean, usual), verdict(clean, "explained"), promise=promise)
+    assert asked == [None, {"random walk"}][: 1 + searched]

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from usual_twin import UsualTwin
 
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import InputError
 from gfimu.diagnosis import diagnose
 from gfimu.diagnosis.report.folder import write_diagnosis
 from gfimu.diagnosis.report.plain_words import story
-from gfimu.errors import InputError
-from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
 from sim.effects import make_effect
+from sim.trials.worlds.hidden import Measurement, measure, random_profile
 from sim.twin import Twin
-from sim.worlds.hidden import Measurement, measure, random_profile
 
 SETTING = Measurement(duration=24.0)
 CHANNEL = "a31"
@@ -56,6 +56,7 @@ def stretched(t, spin, readings, reference):
     reference += 0.002 * spin.rate**2
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(
     ("change", "seed", "function", "key", "size"),
     [
@@ -85,6 +86,7 @@ def test_a_dependence_without_a_name_extends_the_twin(twin, tmp_path, change, se
     assert again.verdict == "nothing_found", again.sentences
 
 
+@pytest.mark.study
 def test_a_tone_of_one_recording_is_described_and_left_out_of_the_twin(twin):
     found = diagnose([recorded(twin, 4, whistle)], twin)
     assert found.verdict == "unknown"
@@ -101,6 +103,7 @@ def test_a_tone_of_one_recording_is_described_and_left_out_of_the_twin(twin):
     assert found.residual.rms_after > 1.1 * found.residual.noise_floor
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("late", [0.0, 0.0145], ids=["in phase", "in another phase"])
 def test_only_a_second_recording_confirms_a_tone(twin, late):
     def again(t, spin, readings, reference):
@@ -111,6 +114,7 @@ def test_only_a_second_recording_confirms_a_tone(twin, late):
     assert any(name.startswith("tone at 17.3") for name in terms(found)) == (late == 0.0)
 
 
+@pytest.mark.study
 def test_runs_share_their_terms_with_a_run_that_was_not_there(twin):
     found = diagnose([recorded(twin, 3, pickup), recorded(twin, 30, pickup)], twin)
     assert found.verdict == "unknown"
@@ -119,6 +123,7 @@ def test_runs_share_their_terms_with_a_run_that_was_not_there(twin):
     assert diagnose([recorded(twin, 31, pickup)], found.twin).verdict == "nothing_found"
 
 
+@pytest.mark.study
 def test_a_table_with_an_encoder_gets_terms_of_its_channels(twin):
     encoder = replace(twin, drive_source="angle")
     rng = np.random.default_rng(3)
@@ -131,6 +136,7 @@ def test_a_table_with_an_encoder_gets_terms_of_its_channels(twin):
     assert set(terms(found)) == {"2 per revolution × rate (cosine)"}
 
 
+@pytest.mark.study
 def test_what_no_function_predicts_is_not_in_the_twin(twin):
     rng = np.random.default_rng(9)
 
@@ -145,6 +151,7 @@ def test_what_no_function_predicts_is_not_in_the_twin(twin):
     assert any("No function of the motion" in sentence for sentence in found.sentences)
 
 
+@pytest.mark.study
 def test_named_causes_need_no_terms_without_a_name(twin):
     tilt = make_effect("table_tilt", {"x_rad": 0.01}, twin.array)
     found = diagnose([measure(np.random.default_rng(7), twin, [tilt], SETTING)], twin)

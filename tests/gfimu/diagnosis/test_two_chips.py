@@ -11,6 +11,9 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
 
+from gfimu.array.array import AccelerometerArray, Chip
+from gfimu.base.errors import InputError
+from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.data.body.run import prepare_body_run
 from gfimu.diagnosis.data.body.stretch import make_body_stretches
@@ -21,11 +24,8 @@ from gfimu.diagnosis.terms.hand.noise import Projection
 from gfimu.diagnosis.terms.hand.posterior import condition_hand
 from gfimu.diagnosis.verdict.gate import impossible_sizes, judge
 from gfimu.diagnosis.verdict.parts import NamedCause, Residual
-from gfimu.errors import InputError
-from gfimu.geometry.array import AccelerometerArray, Chip
 from gfimu.motion.body_drive import BodyDrive
 from gfimu.recording import Recording
-from gfimu.units import STANDARD_GRAVITY
 from sim.effects import make_effect
 from sim.twin import Twin
 
@@ -76,6 +76,7 @@ def shifted():
     return diagnose([moved(("sensor_position", {"b_x_m": 4e-3, "b_y_m": -3e-3}))], RIG)
 
 
+@pytest.mark.study
 def test_of_a_displacement_only_the_difference_of_two_chips_is_reported():
     found = shifted()
     assert [cause.effect for cause in found.causes] == ["sensor_position"]
@@ -99,6 +100,7 @@ def test_what_stays_open_is_listed_in_the_verdict_and_in_one_sentence():
     assert f"{len(text)} combinations, which stay at zero with the standard deviation of their prior" in sentence
 
 
+@pytest.mark.study
 def test_an_open_combination_has_the_spread_of_its_prior():
     """A bias of all chips is a specific force: of the two only the difference is known."""
     found = diagnose([moved(("bias", {"b3_m_s2": 0.8, "a3_m_s2": 0.2}), seed=3)], RIG)
@@ -116,6 +118,7 @@ def test_two_chips_with_nothing_wrong(seed):
     assert (found.verdict, found.causes) == ("nothing_found", ())
 
 
+@pytest.mark.study
 def test_vibration_that_the_chips_do_not_share_moves_none_of_them():
     """Small common force, large vibration of each: gains once ran to −1 here, and a matrix became singular."""
     found = diagnose([moved(seed=6, force=0.3, vibration=1.5, duration=15.0)], RIG)
@@ -148,7 +151,7 @@ def test_late_stamps_lose_nothing_on_a_free_body():
     late = recording.t_s + np.abs(np.random.default_rng(1).normal(0.0, 2e-3, len(recording)))
     found = diagnose([replace(recording, t_s=np.maximum.accumulate(late) + 1e-7 * np.arange(len(late)))], RIG)
     assert (found.verdict, found.causes) == ("nothing_found", ())
-    assert found.noise["time_jitter_s"] == pytest.approx(1.2e-3, rel=0.15)
+    assert found.noise.time_jitter_s == pytest.approx(1.2e-3, rel=0.15)
 
 
 @pytest.mark.parametrize(("vibration", "least", "most"), [(0.0, 1.0, 1.6), (0.3, 2.0, 1e3)])
@@ -241,6 +244,7 @@ def belt(folder, stop):
     return recording.between(0.0, stop), twin
 
 
+@pytest.mark.study
 def test_a_real_wheel_has_no_moved_chips_turned_gyros_or_large_gains(shared_data):
     if not (shared_data / "wid").is_dir():
         pytest.skip("no ../shared/data/wid")
@@ -255,6 +259,7 @@ def test_a_real_wheel_has_no_moved_chips_turned_gyros_or_large_gains(shared_data
     assert found.undetermined
 
 
+@pytest.mark.study
 def test_a_real_belt_box_has_what_others_found_and_nothing_that_both_chips_share(shared_data):
     """By plain least squares: gains apart by 3, 3 and 0 %, z offsets by 1.2 to 1.3 m/s², places by about 6 mm in z."""
     if not (shared_data / "sisfall").is_dir():

@@ -9,10 +9,11 @@ from gfimu.diagnosis.data.stretch import make_stretches
 from gfimu.diagnosis.diagnose import prepare
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.nuisance_models import understand
-from sim.study.cases import Case
-from sim.study.outcome import draw_world
+from sim.trials.study.cases import Case
+from sim.trials.study.outcome import draw_world
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(
     ("effects", "walks"),
     [(("bias_random_walk",), True), (("warm_up",), False), (("gain_drift", "bias"), False), ((), False)],
@@ -24,22 +25,26 @@ def test_the_biases_walk_where_a_walk_is_hidden_and_nowhere_else(effects, walks)
     assert (found.walk is not None) == walks
 
 
+@pytest.mark.study
 def test_a_walk_and_what_is_beside_it_are_found():
     world = draw_world(Case("walks", 91002, ("bias_random_walk", "eccentricity"), 1000.0, duration=20.0))
     found = diagnose([world.recording], world.twin)
     assert {cause.effect for cause in found.causes} == {"bias_random_walk", "eccentricity"}
 
 
+@pytest.mark.study
 def test_a_walk_is_found_beside_a_slow_cause_that_is_right():
     """In 15 s one slow cause of two passes for the walk; without both a walk fits worse than with both it would."""
     settings = {"duration": 15.0, "sample_rate": 200.0, "bias_instability_mg": 0.061, "tacho_noise": 0.0436}
     case = Case("walks", 872_020, ("bias_random_walk", "scale_factor"), 207.8, **settings)
-    generator = str(Path(__file__).parents[3] / "sim" / "benchmark" / "generators" / "independent_world.py:hide")
+    generators = Path(__file__).parents[3] / "sim" / "trials" / "benchmark" / "generators"
+    generator = f"{generators / 'independent_world.py'}:hide"
     world = draw_world(case, generator)
     found = diagnose([world.recording], world.twin)
     assert {cause.effect for cause in found.causes} == {"bias_random_walk", "scale_factor"}
 
 
+@pytest.mark.study
 def test_a_walk_over_coarse_steps_is_told_with_its_strength():
     """The edges at which coarse readings tell much move with the biases."""
     world = draw_world(Case("walks", 91023, ("bias_random_walk", "coarse_resolution"), 1000.0, duration=14.0))
@@ -51,6 +56,7 @@ def test_a_walk_over_coarse_steps_is_told_with_its_strength():
     assert abs(walk.parameters[key] - dict(world.truth)["bias_random_walk"][key]) < 3.0 * walk.std[key]
 
 
+@pytest.mark.study
 def test_an_effect_that_the_library_lacks_is_no_walk():
     """An axis that nods, in a library without it, looks like a random walk of the biases at first sight."""
     world = draw_world(
@@ -63,6 +69,7 @@ def test_an_effect_that_the_library_lacks_is_no_walk():
     assert "bias_random_walk" not in {cause.effect for cause in found.causes}
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(
     ("seed", "effects", "size", "group"),
     [(30112, ("gain_drift", "warm_up"), 300.0, "pairs"), (91004, ("eccentricity", "clock_error"), 1000.0, "walks")],

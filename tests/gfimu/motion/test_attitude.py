@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from gfimu.errors import InputError
+from gfimu.base.errors import InputError
 from gfimu.motion.attitude import (
     ATTITUDE_METHODS,
     from_rotation,

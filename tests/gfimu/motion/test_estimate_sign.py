@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from gfimu import AccelerometerArray, Recording, specific_force, summarise
+from gfimu.array.parts.limits import PartLimits
 from gfimu.motion.estimate import Estimate
 from gfimu.motion.estimation import estimate
-from gfimu.parts.limits import PartLimits
 from gfimu.visual.run_plots import free_rate_plots
 
 CUBE = AccelerometerArray.load("cube12")

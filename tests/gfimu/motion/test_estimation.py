@@ -8,12 +8,12 @@ from scipy.spatial.transform import Rotation
 
 import gfimu
 from gfimu import AccelerometerArray, Chip, Estimate, InputError, Recording, estimate, specific_force, summarise
-from gfimu.errors import GeometryError
-from gfimu.geometry.kinematics import omega_products
+from gfimu.array.kinematics import omega_products
+from gfimu.array.parts.part import white_noise_std
+from gfimu.base.errors import GeometryError
+from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.motion.attitude import integrate_attitude, to_rotation
 from gfimu.motion.estimate_summary import centripetal_agreement
-from gfimu.parts.part import white_noise_std
-from gfimu.units import STANDARD_GRAVITY
 
 CUBE = AccelerometerArray.load("cube12")
 
@@ -144,14 +144,15 @@ def test_start_can_be_given():
 def test_position_where_asked_for():
     recording = spinning_run()
     assert estimate(recording, CUBE).position is None
-    still = estimate(recording, CUBE, with_position=True)
+    still = estimate(recording, CUBE, position=True)
     np.testing.assert_allclose(still.position, 0.0, atol=1e-6)  # the cube turns about its own centre
     pushed = replace(recording, readings=recording.readings + CUBE.axes @ [0.0, 0.0, 0.5])
-    moved = estimate(pushed, CUBE, with_position=True)
+    moved = estimate(pushed, CUBE, position=True)
     np.testing.assert_allclose(moved.position[:, 2], 0.25 * recording.t_s**2, atol=1e-6)
     np.testing.assert_allclose(moved.velocity[:, 2], 0.5 * recording.t_s, atol=1e-6)
 
 
+@pytest.mark.study
 def test_standard_deviation_of_the_rate_is_its_scatter():
     n, runs, noise = 200, 400, 0.04
     rng = np.random.default_rng(6)
@@ -203,10 +204,10 @@ def test_unknown_names():
 
 
 @pytest.mark.parametrize("suffix", ["csv", "parquet"])
-@pytest.mark.parametrize("with_position", [False, True])
-def test_file_there_and_back(tmp_path, suffix, with_position):
+@pytest.mark.parametrize("position", [False, True])
+def test_file_there_and_back(tmp_path, suffix, position):
     recording, *_ = tumbling_run(CUBE, n=50)
-    found = estimate(recording, CUBE, with_position=with_position)
+    found = estimate(recording, CUBE, position=position)
     found.write(tmp_path / f"estimate.{suffix}")
     back = Estimate.read(tmp_path / f"estimate.{suffix}")
     for name in Estimate.__dataclass_fields__:
@@ -220,7 +221,7 @@ def test_file_there_and_back(tmp_path, suffix, with_position):
 
 def test_file_has_the_columns_of_the_format():
     recording, *_ = tumbling_run(CUBE, n=50)
-    columns = estimate(recording, CUBE, with_position=True).to_columns()
+    columns = estimate(recording, CUBE, position=True).to_columns()
     for quantity, unit in {
         "p": "m_s2",
         "alpha": "rad_s2",

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import gfimu
-from gfimu.errors import InputError
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.integrity.fault import HealthCode
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import InputError
 from gfimu.motion.estimate import Estimate
+from gfimu.rate.health.fault import HealthCode
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from gfimu.errors import InputError
+from gfimu.base.errors import InputError
 from gfimu.motion.attitude import from_rotation, integrate_attitude, to_rotation
 from gfimu.motion.navigation import level, navigate
 

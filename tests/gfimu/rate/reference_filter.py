@@ -4,6 +4,7 @@ agree with them. No rest, no faults, even sampling, a six-point stencil througho
 from __future__ import annotations
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from gfimu.rate.sensing import ChannelTables
 
@@ -27,6 +28,34 @@ def products(omega):
 def slopes(omega):
     x, y, z = omega
     return np.array([[2 * x, 0, 0], [0, 2 * y, 0], [0, 0, 2 * z], [y, x, 0], [z, 0, x], [0, z, y]])
+
+
+def probable(omega, spread, p, z, sensitivity):
+    """Most probable rate by its prediction and a sample whose biases are free, and its covariance."""
+    d = len(z)
+    gain = np.linalg.solve(spread, p[:3, 6 : 6 + d]).T
+    noise = p[6 : 6 + d, 6 : 6 + d] + np.eye(d) - gain @ p[:3, 6 : 6 + d]
+    white, prior = (np.linalg.inv(np.linalg.cholesky(one)) for one in (noise, spread))
+
+    def misfit(w):
+        return np.concatenate([prior @ (w - omega), white @ (z - sensitivity @ products(w) - gain @ (w - omega))])
+
+    def slope_of(w):
+        return np.vstack([prior, -white @ (sensitivity @ slopes(w) + gain)])
+
+    xx, yy, zz, xy, xz, yz = np.linalg.pinv(sensitivity) @ z
+    size, axes = np.linalg.eigh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+    single = axes[:, 2] * np.sqrt(max(size[2], 0))
+    fits = (least_squares(misfit, w, slope_of, method="lm", xtol=1e-13, ftol=1e-13) for w in (omega, single, -single))
+    best = min(fits, key=lambda one: one.cost)
+    at = best.x
+    bends = np.array([[[2 * m[0], m[3], m[4]], [m[3], 2 * m[1], m[5]], [m[4], m[5], 2 * m[2]]] for m in sensitivity])
+    for _ in range(3):  # Newton's, to rounding
+        jacobian, off = slope_of(at), misfit(at)
+        bent = np.einsum("i,iab->ab", white.T @ off[3:], bends)
+        at = at - np.linalg.solve(jacobian.T @ jacobian - bent, jacobian.T @ off)
+    slope = sensitivity @ slopes(at) + gain
+    return at, np.linalg.inv(np.linalg.inv(spread) + slope.T @ np.linalg.solve(noise, slope))
 
 
 def reference_filter(array, t, readings, errors, *, start_std=1e-3, keep=False):
@@ -63,16 +92,38 @@ def reference_filter(array, t, readings, errors, *, start_std=1e-3, keep=False):
             g /= np.sqrt(1 - ringing**2)
         p = p + g @ noise @ g.T
         predicted = (x.copy(), p.copy())
+        size = np.sum(sensitivity**2)
+        trace = np.trace(p[:3, :3])
+        curved = trace > 1e-3 * x[:3] @ x[:3] and trace**2 * size > 1e-4
+        broad = trace > 0.02 * x[:3] @ x[:3] and trace**2 * size > 1.0
+        if broad:  # no rate is larger than the products allow
+            inverse = np.linalg.pinv(sensitivity)
+            seen = inverse @ (z[k] - x[6 : 6 + d])
+            unsure = inverse @ (p[6 : 6 + d, 6 : 6 + d] + np.eye(d)) @ inverse.T
+            for a in range(3):
+                most = max(seen[a], 0) + 2 * np.sqrt(unsure[a, a])
+                if p[a, a] > most:
+                    variance = most * p[a, a] / (p[a, a] - most)
+                    gain = p[a] / (p[a, a] + variance)
+                    x, p = x - gain * x[a], p - np.outer(gain, p[a])
         omega, spread = x[:3].copy(), p[:3, :3]
+        at, wide = omega, spread
+        if broad:
+            at, wide = probable(omega, spread, p, z[k] - x[6 : 6 + d], sensitivity)
         h = np.zeros((d, n))
-        h[:, :3] = sensitivity @ slopes(omega)
+        h[:, :3] = sensitivity @ slopes(at)
         h[:, 6 : 6 + d] = np.eye(d)
-        expected = sensitivity @ products(omega) + x[6 : 6 + d]
+        expected = sensitivity @ products(at) + h[:, :3] @ (omega - at) + x[6 : 6 + d]
         r = np.ones(d)
-        if k and np.trace(spread) > 1e-3 * omega @ omega:  # the first sample is linearised where it is fitted
+        wider = np.array([2 * np.trace(b @ wide @ b @ wide) for b in forms])
+        if broad:
+            r += wider
+            if np.max(wider) > 1 and 9 * np.trace(wide) > at @ at:  # not used
+                out.append((x[:3].copy(), p[:3, :3].copy(), 0.0, predicted, (x.copy(), p.copy()), f))
+                continue
+        elif curved:
             expected += [np.trace(b @ spread) for b in forms]
-            linear = np.einsum("ia,ab,ib->i", h[:, :3], spread, h[:, :3])
-            r += np.minimum([2 * np.trace(b @ spread @ b @ spread) for b in forms], 4 * linear)
+            r += wider
         s = h @ p @ h.T + np.diag(r)
         gain = np.linalg.solve(s, h @ p).T
         e = z[k] - expected

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import gfimu
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.rate.sensing import SensorErrors
+from gfimu import AccelerometerArray, SensorErrors
 
 ARRAY = AccelerometerArray.load("cube12")
 LSB = 0.0039 * 9.80665

@@ -8,11 +8,11 @@ from rate_worlds import cube, measure, sensor_errors, tumble
 from scipy.stats import chi2
 
 from gfimu import AccelerometerArray, Recording, specific_force, summarise
+from gfimu.array.parts.limits import PartLimits
+from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.motion.rest_bias import estimate_from_rest
-from gfimu.parts.limits import PartLimits
 from gfimu.rate.consistency import FALSE_ALARM, _slow_quantile, judge_consistency, slow_error_signatures
 from gfimu.rate.filter import filter_rate
-from gfimu.units import STANDARD_GRAVITY
 from sim.scenarios import Scenario
 from sim.simulation import simulate
 
@@ -39,6 +39,7 @@ def consistency(run):
     return estimate_from_rest(run, CUBE, method="filter").metadata["consistency"]
 
 
+@pytest.mark.study
 def test_the_false_alarms_of_a_right_model_are_as_stated():
     array, scores, alarms = cube(), [], 0
     for seed in range(40):
@@ -95,6 +96,7 @@ def noise(readings, rng, late):
     readings[late, 4] += 20 * 0.03 * rng.standard_normal(int(late.sum()))
 
 
+@pytest.mark.study(but=["0-20 mg", "0-gain", "0-noise"])
 @pytest.mark.parametrize(
     ("spoil", "channel"),
     [(step(0.020 * STANDARD_GRAVITY), "a11"), (step(1.0), "a11"), (gain, "a31"), (noise, "a22")],
@@ -109,10 +111,11 @@ def test_a_fault_in_mid_run_is_flagged_and_its_channel_named(spoil, channel, see
     assert not judged["consistent"]
     assert judged["worst_channel"] == channel
     assert judged["nis_without_worst"] < 1.2
-    (warning,) = summarise(found, run, CUBE).warnings
+    (warning,) = (one for one in summarise(found, run, CUBE).warnings if "started again" not in one)
     assert channel in warning
 
 
+@pytest.mark.study(only=["0-1 m/s\\xb2", "1-1 m/s\\xb2"])
 @pytest.mark.parametrize(
     ("spoil", "channel"),
     [(step(0.020 * STANDARD_GRAVITY), "a11"), (step(1.0), "a11"), (gain, "a31"), (noise, "a22")],
@@ -135,6 +138,7 @@ def test_uncalibrated_chips_are_consistent(seed):
     assert judged["noise_bound"] < judged["bound"]
 
 
+@pytest.mark.study(only=["11-eccentric_mount", "11-speed_sweep", "12-eccentric_mount", "12-speed_sweep"])
 @pytest.mark.parametrize("name", SCENARIOS)
 @pytest.mark.parametrize("seed", [11, 12])
 def test_shipped_scenarios_are_consistent(name, seed):

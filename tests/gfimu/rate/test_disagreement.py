@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from rate_worlds import cube, measure, sensor_errors, tumble
 
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.array.array import AccelerometerArray
 from gfimu.rate.disagreement import MeasuredNoise, lasting_scale, measured_scale, sum_up_disagreement
 from gfimu.rate.filter import filter_rate
 from gfimu.rate.kalman import FilterSettings

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from rate_worlds import measure, sensor_errors, tumble
 
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.array.array import AccelerometerArray
 from gfimu.rate.kalman import FilterSettings
 from gfimu.rate.live import LiveRateFilter
 from gfimu.rate.stream import filter_stream

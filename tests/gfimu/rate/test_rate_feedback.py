@@ -5,7 +5,7 @@ import pytest
 import scipy.integrate
 
 from gfimu import InputError
-from gfimu.geometry.kinematics import omega_products
+from gfimu.array.kinematics import omega_products
 from gfimu.rate.feedback import integrate_rate_recursively
 
 # α_x = u_x + ω_y ω_z and so on: the six uniaxial sensors at the face centres.

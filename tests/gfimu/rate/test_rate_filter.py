@@ -9,8 +9,9 @@ import pytest
 from rate_worlds import cube, measure, readings, sensor_errors, tumble, turntable
 from reference_filter import reference_filter, reference_smoother
 
-from gfimu.errors import GeometryError, InputError
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.array.array import AccelerometerArray
+from gfimu.array.quadrature import even_weights
+from gfimu.base.errors import GeometryError, InputError
 from gfimu.rate.backward import backward
 from gfimu.rate.disagreement import MeasuredNoise
 from gfimu.rate.filter import filter_rate
@@ -18,7 +19,6 @@ from gfimu.rate.kalman import FilterSettings
 from gfimu.rate.live import LiveRateFilter
 from gfimu.rate.methods import RATE_METHODS, estimate_rate
 from gfimu.rate.preparation import prepare
-from gfimu.rate.quadrature import even_weights
 from gfimu.rate.recursion import forward
 from gfimu.rate.sensing import ChannelTables, SensorErrors
 from gfimu.rate.smoother import smooth_rate
@@ -150,6 +150,7 @@ def test_gap_in_time(run):
     assert found.channels.gaps == 1
 
 
+@pytest.mark.study
 def test_jittered_times(run):
     _, _, errors = run
     fine = tumble(10_000.0, 12.0, duration=8.0)

@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gfimu.errors import InputError
-from gfimu.rate.integration import METHODS, integrate_rate, integrate_samples
+from gfimu.array.integration import METHODS, integrate_rate, integrate_samples
+from gfimu.array.quadrature import STENCILS, even_weights, polynomial_weights
+from gfimu.base.errors import InputError
 from gfimu.rate.kalman import QUADRATURES
-from gfimu.rate.quadrature import STENCILS, even_weights, polynomial_weights
 
 DEGREE = {"trapezoid": 1, "runge_kutta": 2, "adams_moulton4": 3, "centred4": 3, "centred6": 5}
 ORDER = {"trapezoid": 2, "runge_kutta": 4, "adams_moulton4": 3, "centred4": 4, "centred6": 6}

@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from gfimu.array.array import AccelerometerArray
 from gfimu.calibration.array_calibration import calibrate_array
-from gfimu.geometry.array import AccelerometerArray
 from gfimu.rate.filter import filter_rate
 from gfimu.rate.kalman import FilterSettings
 from gfimu.rate.methods import estimate_rate

@@ -20,6 +20,9 @@ def displaced(array, rng, std):
     return array.with_geometry(moved, [chip.axes for chip in array.chips])
 
 
+@pytest.mark.study(
+    only=["tumble-8-0.001-placement", "tumble-8-0.001-scale", "tumble-8-0.01-placement", "tumble-8-0.01-scale"]
+)
 @pytest.mark.parametrize("kind", ["scale", "placement"])
 @pytest.mark.parametrize("size", [1e-3, 1e-2])
 @pytest.mark.parametrize(("world", "speed"), [(turntable, 1), (turntable, 10), (tumble, 8)])
@@ -36,13 +39,15 @@ def test_truth_stays_within_three_sigma_and_beats_the_naive_filter(kind, size, w
         stated = FilterSettings(noise=MeasuredNoise.as_stated(motion.t))
         plain = filter_rate(array, motion.t, values, sensor_errors(array, RATE), stated)
         aware.append((found.omega - motion.omega)[rows])
-        naive.append((plain.omega - motion.omega)[rows])
+        assert np.isfinite(found.omega).all()
+        # The naive filter contradicts its readings now and then and states no rate there.
+        naive.append((plain.omega - motion.omega)[rows & np.isfinite(plain.omega).all(axis=1)])
         inside.append(np.abs(aware[-1]) < 3 * found.std[rows])
     assert np.mean(inside) > 0.98
     if world is turntable and speed == 10:  # where these errors dominate
-        assert rms(naive) > 3 * rms(aware)
+        assert rms(np.concatenate(naive)) > 3 * rms(aware)
     else:
-        assert rms(aware) < 1.5 * rms(naive)
+        assert rms(aware) < 1.5 * rms(np.concatenate(naive))
 
 
 def test_undersampled_acceleration_widens_the_uncertainty():
@@ -61,6 +66,7 @@ def test_undersampled_acceleration_widens_the_uncertainty():
         assert error[solve] < 6
 
 
+@pytest.mark.study
 def test_timing_errors_widen_the_uncertainty():
     array, fine = cube(), tumble(10_000.0, 2 * np.pi * 3, duration=10.0)
     rng = np.random.default_rng(1)

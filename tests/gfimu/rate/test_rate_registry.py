@@ -9,7 +9,7 @@ import pytest
 
 import gfimu
 from gfimu import AccelerometerArray, Recording, specific_force
-from gfimu.errors import InputError
+from gfimu.base.errors import InputError
 from gfimu.motion.estimation import estimate
 from gfimu.motion.rest_bias import estimate_from_rest
 from gfimu.rate import registry

@@ -49,6 +49,7 @@ def outcome(motion, bias, seed):
     return ("right" if found.omega[-1] @ motion.omega[-1] > 0 else "wrong"), found
 
 
+@pytest.mark.study(but=["calibrated-constant"])
 @pytest.mark.parametrize("world", WORLDS)
 @pytest.mark.parametrize("bias", [0.001 * GRAVITY, TURN_ON_BIAS], ids=["calibrated", "uncalibrated"])
 def test_no_wrong_sign_in_200_runs(world, bias):

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from gfimu import AccelerometerArray, InputError, Recording
+from gfimu.array.parts.limits import PartLimits
+from gfimu.array.parts.part import Part, white_noise_std
 from gfimu.calibration.run_file import open_uncalibrated
-from gfimu.parts.limits import PartLimits
-from gfimu.parts.part import Part, white_noise_std
 from gfimu.rate.sensing import SensorErrors
 from gfimu.recording.carried_array import array_difference
 from gfimu.recording.formats import open_run

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from gfimu import AccelerometerArray, InputError, Recording, estimate
-from gfimu.errors import CorruptValueWarning
-from gfimu.parts.plausible import largest_of_array, largest_of_part
+from gfimu.array.parts.plausible import largest_of_array, largest_of_part
+from gfimu.base.errors import CorruptValueWarning
 from gfimu.recording.formats import open_run
 
 CUBE = AccelerometerArray.load("cube12")

@@ -7,9 +7,9 @@ import pytest
 
 import gfimu
 from gfimu import AccelerometerArray, InputError, Recording
-from gfimu.errors import RecordingWarning
-from gfimu.importing.clock import increasing_times
+from gfimu.base.errors import RecordingWarning
 from gfimu.recording.formats import open_run
+from gfimu.recording.importing.clock import increasing_times
 from gfimu.recording.mapped import MappedFile, mapped_recording
 
 CUBE = AccelerometerArray.load("cube12")
@@ -111,7 +111,7 @@ def test_other_commands_leave_out_by_the_map(clean, tmp_path, name, options):
     with pytest.raises(InputError, match="does not increase"):
         getattr(gfimu, name)(path, **options)
     with pytest.warns(RecordingWarning, match="left out 10 rows"):
-        getattr(gfimu, name)(path, map_set=["drop=duplicates"], **options)
+        getattr(gfimu, name)(path, column_map=gfimu.load_map(None, ["drop=duplicates"]), **options)
 
 
 def test_raw_counts_stay_counts(clean, tmp_path):
@@ -119,7 +119,7 @@ def test_raw_counts_stay_counts(clean, tmp_path):
     path = tmp_path / "raw.csv"
     path.write_text((tmp_path / "run.csv").read_text().replace("_m_s2", "_lsb"))
     from gfimu.calibration.run_file import open_uncalibrated
-    from gfimu.importing import load_map
+    from gfimu.recording.importing import load_map
 
     raw = open_uncalibrated(MappedFile(path, load_map(None, ["time.start_s=1"])))
     assert raw.unit == "lsb"
@@ -133,7 +133,7 @@ def test_a_foreign_file_and_a_table_are_filtered_as_well(clean, tmp_path):
     columns["a12"][50], columns["a13"][60] = 1e19, np.nan
     table = pa.table({"time": clean.t_s, **columns})
     names = [f"channels.{name}={name}" for name in clean.channels]
-    from gfimu.importing import load_map
+    from gfimu.recording.importing import load_map
 
     chosen = load_map(None, ["time.column=time", "unit=m/s^2", *names, "drop=corrupt,missing"])
     with pytest.warns(RecordingWarning):
@@ -156,7 +156,7 @@ def test_a_range_that_is_not_known_is_said(tmp_path):
 
 
 def test_the_array_of_a_filtered_recording_is_its_own(clean, tmp_path):
-    from gfimu.importing import load_map
+    from gfimu.recording.importing import load_map
 
     path = written(clean, tmp_path / "run.csv", TWICE)
     with pytest.warns(RecordingWarning):

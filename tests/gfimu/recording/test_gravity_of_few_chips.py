@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from gfimu.geometry.array import AccelerometerArray, Chip
+from gfimu.array.array import AccelerometerArray, Chip
+from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.recording import Recording
 from gfimu.recording.checks import check_recording
-from gfimu.units import STANDARD_GRAVITY
 
 ONE = AccelerometerArray("one", (Chip("a1", np.array([0.15, 0.0, 0.0]), np.eye(3), "generic"),))
 

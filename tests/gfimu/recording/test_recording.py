@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from gfimu import AccelerometerArray, InputError, Recording
-from gfimu.errors import UnitError
-from gfimu.units import STANDARD_GRAVITY
+from gfimu.base.errors import UnitError
+from gfimu.base.units import STANDARD_GRAVITY
 
 CUBE = AccelerometerArray.load("cube12")
 FORMATS = ("csv", "parquet")

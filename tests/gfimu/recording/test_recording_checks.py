@@ -9,15 +9,15 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from gfimu import AccelerometerArray, InputError, Recording, estimate, specific_force
-from gfimu.files.model_files import list_models
+from gfimu.array.parts.limits import PartLimits
+from gfimu.base.files.model_files import list_models
+from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.motion.rest_bias import estimate_from_rest
-from gfimu.parts.limits import PartLimits
 from gfimu.recording.checks import check_recording, refuse_or_warn
 from gfimu.recording.formats import open_run
-from gfimu.units import STANDARD_GRAVITY
-from sim.benchmark.generators.independent_world import hide
 from sim.scenarios import Scenario
 from sim.simulation import simulate
+from sim.trials.benchmark.generators.independent_world import hide
 
 CUBE = AccelerometerArray.load("cube12")
 RATE = 100.0
@@ -166,6 +166,7 @@ def test_a_short_run_of_uncalibrated_chips_is_accepted(seed):
     assert not check_recording(run, CUBE)
 
 
+@pytest.mark.study(only=["a11 and a12", "a11 and a13", "a11 inverted"])
 @pytest.mark.parametrize("name", WRONG)
 def test_a_wrong_file_is_refused_with_its_cause(table_run, name):
     spoil, kind, words = WRONG[name]
@@ -194,6 +195,7 @@ TWICE = {
 }
 
 
+@pytest.mark.study(only=["two inverted"])
 @pytest.mark.parametrize("name", TWICE)
 def test_two_things_wrong_at_once_are_both_named(table_run, name):
     changes, kind, words = TWICE[name]
@@ -284,12 +286,14 @@ def test_errors_within_the_data_sheet_are_not_refused(name, kind, errors):
     assert not [one.text for one in check_recording(run, array) if one.refused]
 
 
+@pytest.mark.study(only=["centrifuge", "eccentric_mount", "speed_sweep"])
 @pytest.mark.parametrize("name", list_models("scenarios"))
 def test_shipped_scenarios_are_clean(name):
     scenario = Scenario.load(name)
     assert check_recording(simulate(scenario, seed=3), scenario.array) == ()
 
 
+@pytest.mark.study(only=["2"])
 @pytest.mark.parametrize("seed", range(4))
 def test_hidden_effects_are_not_refused(seed):
     effects = [(), ("table_tilt", "bias"), ("scale_factor", "misalignment"), ("eccentricity", "sensor_lag")][seed]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gfimu import AccelerometerArray, InputError, Recording, estimate, simulate
-from gfimu.parts.limits import PartLimits
+from gfimu.array.parts.limits import PartLimits
 from gfimu.recording.checks import check_recording
 from gfimu.recording.evidence.reference_rate import odd_rates
 

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gfimu.array.array import AccelerometerArray
 from gfimu.diagnosis.data.run import prepare_run
 from gfimu.diagnosis.data.stretch import make_stretches, moved
 from gfimu.diagnosis.fit.learn import starting_point
 from gfimu.diagnosis.policy import Policy
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.joining import ReferenceSeries, join_reference
 from gfimu.recording import Recording
+from gfimu.recording.joining import ReferenceSeries, join_reference
 from gfimu.recording.timing.reference_times import reference_on_rows, reference_series
 from sim.twin import Twin
 

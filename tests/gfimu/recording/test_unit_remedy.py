@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import gfimu
-from gfimu.errors import InputError
+from gfimu.base.errors import InputError
+from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.recording.checks import check_recording
-from gfimu.units import STANDARD_GRAVITY
 
 
 @pytest.fixture(scope="module")
@@ -61,9 +61,9 @@ def test_a_mapped_file_is_given_its_unit_in_the_map(run, tmp_path):
     table.loc[:, table.columns[1:]] /= STANDARD_GRAVITY
     table.to_csv(tmp_path / "log.csv", index=False)
     keys = ["time.column=time", *(f"channels.{name}=acc{name[1:]}" for name in run.channels)]
-    text = refusal(tmp_path / "log.csv", array="cube12", map_set=["unit=m/s^2", *keys])
+    text = refusal(tmp_path / "log.csv", array="cube12", column_map=gfimu.load_map(None, ["unit=m/s^2", *keys]))
     assert '; set unit = "g" in the column map;' in text
-    mended = gfimu.estimate(tmp_path / "log.csv", array="cube12", map_set=["unit=g", *keys])
+    mended = gfimu.estimate(tmp_path / "log.csv", array="cube12", column_map=gfimu.load_map(None, ["unit=g", *keys]))
     assert np.isfinite(mended.omega).all()
 
 

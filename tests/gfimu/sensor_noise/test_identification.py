@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from gfimu.errors import InputError
-from gfimu.sensor_noise.identification import identify_noise
+from gfimu import InputError, identify_noise
 
 
 def test_a_smooth_motion_is_no_noise():

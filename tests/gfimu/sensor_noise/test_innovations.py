@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from gfimu.errors import InputError
+from gfimu.base.errors import InputError
 from gfimu.sensor_noise.innovations import add_noise, flicker_shape
-from sim.worlds.hidden import bias_instability
+from sim.trials.worlds.hidden import bias_instability
 
 N = 2000
 WHITE, FLICKER = np.array([0.03, 0.2, 1.0]), np.array([0.1, 0.2, 0.01])

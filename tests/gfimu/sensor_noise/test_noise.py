@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gfimu.errors import InputError, UnitError
+from gfimu.base.errors import InputError, UnitError
 from gfimu.recording import Recording
 from gfimu.sensor_noise import (
     allan_deviation,
@@ -137,6 +137,7 @@ def test_bias_instability_round_trip():
     assert model.allan.bias_instability == pytest.approx(0.001, rel=0.25)  # minimum / 0.664, one noisy point
 
 
+@pytest.mark.study
 def test_intervals_are_honest():
     """95 % intervals of N and K over 200 runs, and few terms that are not there."""
     rng = np.random.default_rng(30)
@@ -196,6 +197,14 @@ def test_recording_uses_its_longest_rest(recording):
     np.testing.assert_allclose(values, [0.003, 0.003, 0.004, 1e-4], rtol=0.03)
     assert set(noise.gyros) == {"gyro_x", "gyro_y", "gyro_z"}
     assert recording_noise(recording, stretch="all").models["a11"].found != ("N",)
+
+
+def test_one_sample_scatters_by_the_density_and_the_rate(recording):
+    """White noise of density N sampled at a rate f has the standard deviation N √f."""
+    channels = ("a11", "a12", "a13")
+    noise = recording_noise(recording)
+    scatter = recording.readings[round(noise.start_s * RATE) :].std(axis=0)
+    np.testing.assert_allclose(noise.sample_std(channels), scatter, rtol=0.03)
 
 
 def test_recording_refusals(recording):

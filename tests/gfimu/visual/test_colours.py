@@ -11,8 +11,9 @@ import itertools
 
 import numpy as np
 import pytest
+from every_item import every
 
-from gfimu.visual.colours import AFTER, AFTER_ON_PAPER, BEFORE, BEFORE_ON_PAPER, SEPARATED, chip_colour, css
+from gfimu.base.results.colours import AFTER, AFTER_ON_PAPER, BEFORE, BEFORE_ON_PAPER, SEPARATED, chip_colour, css
 
 VISION = {
     "normal": np.eye(3),
@@ -91,7 +92,7 @@ def test_the_former_red_and_green_would_not_pass():
 
 
 @pytest.mark.parametrize("vision", VISION)
-@pytest.mark.parametrize("picture", SEPARATED)
+@every("picture", SEPARATED)
 def test_colours_of_one_picture_stay_apart(picture, vision):
     assert least_difference(SEPARATED[picture].values(), vision) > LEAST
 
@@ -104,7 +105,7 @@ def test_before_and_after_stay_far_apart(vision):
 
 @pytest.mark.parametrize("on_paper", [False, True])
 @pytest.mark.parametrize("vision", VISION)
-@pytest.mark.parametrize("count", LEAST_OF_CHIPS)
+@every("count", LEAST_OF_CHIPS)
 def test_few_chips_stay_apart(count, vision, on_paper):
     colours = [chip_colour(chip, on_paper=on_paper) for chip in range(count)]
     assert least_difference(colours, vision) > LEAST_OF_CHIPS[count]
@@ -122,7 +123,7 @@ def hue(colour) -> float:
     return float(np.degrees(np.arctan2(b, a)))
 
 
-@pytest.mark.parametrize("chip", range(0, 64, 7))
+@every("chip", range(0, 64, 7))
 def test_axes_of_a_chip_share_its_hue_and_differ_in_lightness(chip):
     axes = [chip_colour(chip, axis) for axis in range(3)]
     light = [lab(colour, "normal")[0] for colour in axes]

@@ -43,6 +43,7 @@ def titles(layout) -> list[str]:
     return sorted(columns["display_name"][0][0] for columns in layout.views("TimeSeries").values())
 
 
+@pytest.mark.study(only=["turntable"])
 @pytest.mark.parametrize(
     ("kind", "expected"),
     [
@@ -62,6 +63,7 @@ def test_a_simulation_is_drawn_with_its_truth(simulated, kind, expected):
     assert table == (kind == "turntable")
 
 
+@pytest.mark.study(only=["wheel"])
 @pytest.mark.parametrize("kind", SHORT)
 def test_a_recording_is_drawn_with_its_estimate(simulated, tmp_path, kind):
     layout = check_layout(gfimu.view(simulated(kind)[0], out=tmp_path / "view.rrd"))

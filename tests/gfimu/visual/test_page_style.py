@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 import gfimu
-from gfimu.visual.colours import PAGE, chip_colour, css
+from gfimu.base.results.colours import PAGE, chip_colour, css
 from gfimu.visual.page import STILL_POLICY, page_plots, page_style
 from gfimu.visual.page.packed import Packed
 

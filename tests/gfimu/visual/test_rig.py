@@ -8,9 +8,9 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from gfimu import AccelerometerArray
-from gfimu.geometry.array import Chip
-from gfimu.geometry.turning_axis import TurningAxis
-from gfimu.visual.colours import chip_colour
+from gfimu.array.array import Chip
+from gfimu.array.turning_axis import TurningAxis
+from gfimu.base.results.colours import chip_colour
 from gfimu.visual.rig import (
     array_shapes,
     axis_shapes,

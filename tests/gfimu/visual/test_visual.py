@@ -16,9 +16,9 @@ from scipy.spatial.transform import Rotation
 
 import gfimu
 from gfimu import AccelerometerArray, InputError, Recording, specific_force
-from gfimu.geometry.array import Chip
-from gfimu.geometry.turning_axis import TurningAxis
-from gfimu.integrity.fault import HealthCode
+from gfimu.array.array import Chip
+from gfimu.array.turning_axis import TurningAxis
+from gfimu.rate.health.fault import HealthCode
 from gfimu.recording.formats import open_run
 from gfimu.visual import Box, Cylinder, ExpectedDrift, KnownMotion, Line, Mesh, Plot, write_comparison, write_run
 from gfimu.visual.picture import picture_of, picture_path

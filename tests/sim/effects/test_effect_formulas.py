@@ -8,8 +8,8 @@ import pytest
 from scipy.signal import lsim
 from scipy.spatial.transform import Rotation
 
-from gfimu.generic_basis import Motion, basis_function
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.array.array import AccelerometerArray
+from gfimu.model.generic_basis import Motion, basis_function
 from gfimu.motion.body_drive import BodyDrive
 from sim import forward
 from sim.body import body_channels

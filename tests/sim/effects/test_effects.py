@@ -10,24 +10,25 @@ from types import SimpleNamespace
 import mujoco
 import numpy as np
 import pytest
+from every_item import every
 from scipy.interpolate import CubicSpline
 from scipy.signal import lsim, lti
 
-from gfimu.errors import InputError
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import InputError
 from sim import forward
-from sim.benchmark.generators.independent_effects import DRAWS, SIZELESS, rig_with
-from sim.benchmark.generators.independent_table import Rig, TableRun, drive_table
-from sim.benchmark.generators.independent_world import Setting, noise_free
 from sim.effects import EFFECTS, Effect, apply_effects, make_effect
 from sim.effects.low_pass import low_pass, mass_on_spring
 from sim.motions.motion import SpinState, SplineSpin
 from sim.motions.profiles import Chirp, Hold, Ramp, spin_profile
 from sim.rigs.rig_model import turntable_model
 from sim.rigs.turntable import prescribed_readings
+from sim.trials.benchmark.generators.independent_effects import DRAWS, SIZELESS, rig_with
+from sim.trials.benchmark.generators.independent_table import Rig, TableRun, drive_table
+from sim.trials.benchmark.generators.independent_world import Setting, noise_free
+from sim.trials.worlds.hidden import random_profile
 from sim.twin import Twin
 from sim.world import SampleContext, World
-from sim.worlds.hidden import random_profile
 
 # The contract's names with one valid set of parameters each.
 CONTRACT = {
@@ -108,7 +109,7 @@ def test_the_library_holds_every_effect_of_the_contract():
     assert all(family.name == name and family.summary and family.separated_by for name, family in EFFECTS.items())
 
 
-@pytest.mark.parametrize("name", CONTRACT)
+@every("name", CONTRACT)
 def test_parameter_keys_are_the_contracts(name, cube12):
     make_effect(name, CONTRACT[name], cube12)
     with pytest.raises(InputError, match=rf"{name}.*unknown parameter 'nonsense_m'.*valid: "):

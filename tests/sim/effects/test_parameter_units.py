@@ -4,11 +4,12 @@ import re
 
 import numpy as np
 import pytest
+from every_item import every
 
 from gfimu import AccelerometerArray
+from gfimu.base.units import KEY_ENDINGS, NAME, NUMBER, RATIO, key_name
 from gfimu.diagnosis.report.plain_words import parameter_texts
 from gfimu.diagnosis.verdict.parts import NamedCause
-from gfimu.units import KEY_ENDINGS, NAME, NUMBER, RATIO, key_name
 from sim.effects import BODY_EFFECTS, EFFECTS
 from sim.effects.base import Size
 from sim.effects.unknown import Unknown
@@ -19,7 +20,7 @@ PHYSICAL = re.compile(r"(1|m|s|rad|Hz|K|√|⁴|²|³|/|\(|\))+")
 LONE_UNITS = {"rad": "°", "m/s²": "mg", "rad/s": "rpm"}
 
 
-@pytest.mark.parametrize("name", REGISTRY)
+@every("name", REGISTRY)
 def test_every_parameter_has_a_unit_or_is_declared_to_have_none(name):
     units = REGISTRY[name].parameter_units(CUBE)
     assert units.keys() == set(REGISTRY[name].parameter_keys(CUBE))
@@ -27,7 +28,7 @@ def test_every_parameter_has_a_unit_or_is_declared_to_have_none(name):
         assert unit in {RATIO, NUMBER, NAME} or PHYSICAL.fullmatch(unit), (key, unit)
 
 
-@pytest.mark.parametrize("name", REGISTRY)
+@every("name", REGISTRY)
 def test_every_key_ends_in_its_unit_and_in_no_other(name):
     units = REGISTRY[name].parameter_units(CUBE) | {size.key: size.unit for size in REGISTRY[name].sizes(CUBE)}
     for key, unit in units.items():
@@ -36,13 +37,13 @@ def test_every_key_ends_in_its_unit_and_in_no_other(name):
         assert KEY_ENDINGS.get(unit) == longest, f"{key} ends in {longest}, but is declared in {unit}"
 
 
-@pytest.mark.parametrize("name", REGISTRY)
+@every("name", REGISTRY)
 def test_every_size_has_a_unit_of_its_own(name):
     for size in REGISTRY[name].sizes(CUBE):
         assert size.unit == RATIO or PHYSICAL.fullmatch(size.unit), (size.key, size.unit)
 
 
-@pytest.mark.parametrize("name", REGISTRY)
+@every("name", REGISTRY)
 def test_what_a_diagnosis_fits_has_units(name):
     """Sizes and shapes become parameters, each of which has a unit."""
     effect = REGISTRY[name]
@@ -56,7 +57,7 @@ def test_a_size_needs_a_unit():
         Size(key="a11_m_s2", prior_std=0.1)
 
 
-@pytest.mark.parametrize("name", REGISTRY)
+@every("name", REGISTRY)
 def test_every_parameter_prints_with_its_unit(name):
     units = REGISTRY[name].parameter_units(CUBE)
     values = {key: "a1" if unit == NAME else 0.0123 for key, unit in units.items()}

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.signal import lsim, lti
 
-from gfimu.errors import InputError
-from gfimu.files.model_files import find_model
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import InputError
+from gfimu.base.files.model_files import find_model
 from sim import forward
 from sim.effects import EFFECTS, FURTHER_EFFECTS, make_effect
 from sim.effects.rig import shake_orders, sway_shapes
@@ -14,8 +14,8 @@ from sim.effects.unlisted import UNLISTED
 from sim.motions.motion import SpinState
 from sim.rigs.turntable import prescribed_readings
 from sim.scenarios import Scenario
+from sim.trials.worlds.hidden import random_profile
 from sim.twin import Twin
-from sim.worlds.hidden import random_profile
 
 ARRAY = AccelerometerArray.load("cube12")
 TWIN = Twin(array=ARRAY, array_name="cube12")

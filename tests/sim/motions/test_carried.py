@@ -5,8 +5,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import gfimu
-from gfimu.errors import InputError
-from gfimu.known_axis.axis_gyro import with_axis_gyro
+from gfimu.base.errors import InputError
+from gfimu.rate.axis.axis_gyro import with_axis_gyro
 from sim.motions.carried import Hand, Wheel
 from sim.motions.profiles import Hold, Ramp, spin_profile
 from sim.scenarios import Scenario

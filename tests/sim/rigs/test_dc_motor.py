@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from gfimu.errors import InputError
-from gfimu.files.model_files import find_model
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import InputError
+from gfimu.base.files.model_files import find_model
 from sim import forward
 from sim.motions.motion import SpinState
 from sim.motions.profiles import Hold, Ramp, spin_profile

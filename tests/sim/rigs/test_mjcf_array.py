@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from gfimu.errors import InputError, RecordingWarning
-from gfimu.files.model_files import find_model
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import InputError, RecordingWarning
+from gfimu.base.files.model_files import find_model
 from sim.rigs.mjcf_array import array_from_mjcf
 
 TURNED = """<mujoco>

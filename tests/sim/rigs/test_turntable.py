@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from gfimu.errors import InputError
-from gfimu.geometry.array import AccelerometerArray, Chip
-from gfimu.geometry.kinematics import specific_force
-from gfimu.units import STANDARD_GRAVITY
+from gfimu.array.array import AccelerometerArray, Chip
+from gfimu.array.kinematics import specific_force
+from gfimu.base.errors import InputError
+from gfimu.base.units import STANDARD_GRAVITY
 from sim import forward
 from sim.effects import make_effect
 from sim.motions.motion import SpinState

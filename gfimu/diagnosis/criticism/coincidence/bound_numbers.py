@@ -19,6 +19,7 @@ from itertools import combinations, pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.array.array import AccelerometerArray
 from gfimu.diagnosis.criticism.coincidence.patterns import (
     NOTHING,
     SPARE,
@@ -31,8 +32,7 @@ from gfimu.diagnosis.criticism.coincidence.patterns import (
 from gfimu.diagnosis.fit.evidence import SCALES, inverse, log_evidence
 from gfimu.diagnosis.fit.gauss_newton import Fit
 from gfimu.diagnosis.terms.cause import Cause
-from gfimu.geometry.array import AccelerometerArray
-from gfimu.world_model import Size
+from gfimu.model.world_model import Size
 
 __all__ = ["Coincidence", "coincidences"]
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.geometry.array import AccelerometerArray
+from gfimu.array.array import AccelerometerArray
 
 __all__ = ["NOTHING", "SPARE", "Pattern", "channel_patterns", "chip_patterns", "distinct", "pair_patterns"]
 

@@ -14,20 +14,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.declared import Declared, figure
 from gfimu.diagnosis.criticism.views.dependence import BINS
 from gfimu.diagnosis.data.body.stretch import BodyStretch
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.learn import starting_point
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.terms.coloured_noise import FLICKER_GRID
-from gfimu.geometry.array import AccelerometerArray
 
 __all__ = ["BandPower", "RigidMotion", "motion_columns", "rigid_motion"]
 
@@ -55,52 +56,40 @@ class BandPower:
 
 
 @dataclass(frozen=True)
-class RigidMotion:
+class RigidMotion(Declared):
     """How a residual divides into single chips, the whole array and a spin.
 
-    Parameters
-    ----------
-    chips, chips_slow : float
-        Excess of the squares over those of noise in the combinations that no motion reaches, at all frequencies and
-        at low ones, in standard deviations, the error of the noise's level included.
-    array, array_slow : float
-        The same in the combinations of a motion of the whole array other than a spin.
-    combinations : int
-        How many combinations no motion reaches; 0 where the array has none and can't be tested.
-    place : {"", "chips", "array", "spin"}
-        Where the residual is made: ``"spin"`` where neither of the others is seen, also where there is nothing; empty
-        where that can't be tested.
-    frame : {"", "laboratory", "body"}
-        In which frame a motion of the whole array is simpler; empty where that can't be said.
-    power : BandPower
-        The same by frequency.
+    Sizes are excesses of the squares over those of noise, at all frequencies and at low ones, in standard deviations,
+    the error of the noise's level included. ``power`` is the same by frequency.
     """
 
-    chips: float
-    chips_slow: float
-    array: float
-    array_slow: float
-    combinations: int
-    place: str
-    frame: str
+    place: Annotated[
+        str,
+        figure(
+            "Where the residual is made: chips, array or spin (neither of the others is seen); empty where that can't "
+            "be tested."
+        ),
+    ]
+    frame: Annotated[
+        str,
+        figure(
+            "Frame in which a motion of the whole array is simpler, laboratory or body; empty where that can't be said."
+        ),
+    ]
+    combinations: Annotated[int, figure("Combinations of channels that no motion reaches; 0: can't be tested.")]
+    chips: Annotated[float, figure("Size of the part of single chips, in standard deviations.", key="chips_std")]
+    chips_slow: Annotated[float, figure("Size of its slow part, in standard deviations.", key="chips_slow_std")]
+    array: Annotated[
+        float,
+        figure("Size of the part of the whole array but a spin, in standard deviations.", key="array_std"),
+    ]
+    array_slow: Annotated[float, figure("Size of its slow part, in standard deviations.", key="array_slow_std")]
     power: BandPower
 
     @property
     def excesses(self) -> tuple[float, ...]:
         """All excesses, in standard deviations."""
         return self.chips, self.chips_slow, self.array, self.array_slow
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON form."""
-        return {
-            "place": self.place,
-            "frame": self.frame,
-            "combinations": self.combinations,
-            "chips_std": self.chips,
-            "chips_slow_std": self.chips_slow,
-            "array_std": self.array,
-            "array_slow_std": self.array_slow,
-        }
 
     @property
     def sentence(self) -> str:
@@ -162,7 +151,7 @@ def rigid_motion(stretches: Sequence[Stretch], policy: Policy = Policy()) -> Rig
     frame = ""
     if place == "array" and abs(simpler) > policy.excess_stds * _FRAME_SPREAD:
         frame = "laboratory" if simpler > 0.0 else "body"
-    return RigidMotion(*chips, *array, combinations, place, frame, _by_band(parts))
+    return RigidMotion(place, frame, combinations, *chips, *array, _by_band(parts))
 
 
 def motion_columns(array: AccelerometerArray, mounting: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.short_repr import short_repr
+from gfimu.base.short_repr import short_repr
 
 __all__ = ["RunView"]
 

@@ -17,7 +17,7 @@ from gfimu.diagnosis.fit.learn import starting_point
 from gfimu.diagnosis.fit.linear import linearise
 from gfimu.diagnosis.terms.cause import effects_of
 from gfimu.diagnosis.terms.spline import AngleSpline
-from gfimu.world_model import Spin, is_linear
+from gfimu.model.world_model import Spin, is_linear
 
 __all__ = ["run_views"]
 

@@ -8,15 +8,15 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.base.errors import InputError
 from gfimu.diagnosis.data.body.run import prepare_body_run
 from gfimu.diagnosis.data.body.stretch import BodyStretch
 from gfimu.diagnosis.data.integrity import check_integrity
 from gfimu.diagnosis.data.prepared_runs import PreparedRuns
 from gfimu.diagnosis.data.run import MINIMUM_SAMPLES, Run
-from gfimu.errors import InputError
+from gfimu.model.world_model import BodyModel, Effect, WorldModel
 from gfimu.motion.body_drive import BodyDrive
 from gfimu.recording import Recording
-from gfimu.world_model import BodyModel, Effect, WorldModel
 
 __all__ = ["prepare_bodies", "robust_prediction"]
 

@@ -12,8 +12,8 @@ from gfimu.diagnosis.data.body.gyro import SmoothGyro, smooth_gyro
 from gfimu.diagnosis.data.reference import GYRO_COLUMNS
 from gfimu.diagnosis.data.run import Run, possible_values, prepare_run
 from gfimu.diagnosis.data.time_grid import time_grid
+from gfimu.model.world_model import WorldModel
 from gfimu.recording import Recording
-from gfimu.world_model import WorldModel
 
 __all__ = ["AVERAGING", "REST_FLOOR", "BodyRun", "prepare_body_run"]
 

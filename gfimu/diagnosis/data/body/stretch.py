@@ -13,9 +13,9 @@ from scipy.ndimage import uniform_filter1d
 from gfimu.diagnosis.data.body.run import BodyRun
 from gfimu.diagnosis.data.cosine_basis import CosineBasis
 from gfimu.diagnosis.data.run import Run
-from gfimu.diagnosis.data.stretch import Stretch
+from gfimu.diagnosis.data.stretch import Stretch, finite_prediction
+from gfimu.model.world_model import BodyModel, Effect, WorldModel, is_of_wiring
 from gfimu.motion.body_drive import BodyDrive
-from gfimu.world_model import BodyModel, Effect, WorldModel, is_of_wiring
 
 __all__ = ["BodyStretch", "make_body_stretches"]
 
@@ -147,10 +147,10 @@ class BodyStretch(Stretch):
         return np.asarray(total / np.maximum(self.count, 1)[:, None])
 
     def channels(self, effects: Sequence[Effect], drive: BodyDrive) -> NDArray[np.float64]:
-        """Predict the channels of every sample, shape (n, c), m/s²."""
-        run = self.run
-        return self.model.predict_body(
-            drive, run.t, effects=[*self.known, *effects], temperature=run.temperature, start=self.start
+        """Predict the channels of every sample, shape (n, c), m/s²; raises as `predict`."""
+        run, every = self.run, [*self.known, *effects]
+        return finite_prediction(
+            lambda: self.model.predict_body(drive, run.t, effects=every, temperature=run.temperature, start=self.start)
         )
 
     def predict(self, effects: Sequence[Effect], drive: object) -> NDArray[np.float64]:

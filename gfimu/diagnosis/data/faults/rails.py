@@ -13,12 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.diagnosis.data.run import Run
+from gfimu.recording.importing.oddities import BEYOND_PILE, GARBAGE, RAIL_WIDTH
 
-__all__ = ["GARBAGE", "PILE", "Rail", "find_rails", "on_rails", "rail_parameters", "rail_sentence"]
+__all__ = ["PILE", "Rail", "find_rails", "on_rails", "rail_parameters", "rail_sentence"]
 
 PILE = 30  # samples
-_WIDTH = 12  # counts above the pile in which single readings may lie: ten were seen on a real rail
-_BEYOND_PILE = 0.1  # of the samples of the pile: one in forty on a real rail
 _STEEP = 3.0  # times the counts just below it
 _VISITS, _STAY = 2, 5  # times that a rail is reached by a channel that moves, for so many samples each
 _MOVES = 20.0  # noise: range of a channel that moves
@@ -27,7 +26,6 @@ _SLOPE = 0.1  # of the prediction, that readings on a rail follow at most
 _FOLLOWS = (0.5, 2.0)  # of the prediction, elsewhere
 _SCATTER = 6.0  # noise, or counts: a rail that scatters by more is none
 _ON_IT = 0.8  # of the readings that should be beyond a rail
-GARBAGE = 5  # samples that may read anything
 
 
 @dataclass(frozen=True)
@@ -99,7 +97,7 @@ def _pinned(
             level, margin = rail.sign * rail.level, max(1.5 * steps[channel], 3.0 * rail.scatter)
             at = np.abs(mine - level) < margin
             clear = beyond > level + _CLEAR * white[channel] + steps[channel]
-            if len(mine) >= PILE and at.mean() > 1.0 - _BEYOND_PILE and clear.mean() > _ON_IT:
+            if len(mine) >= PILE and at.mean() > 1.0 - BEYOND_PILE and clear.mean() > _ON_IT:
                 found.append(Rail(channel, rail.sign, rail.level, rail.scatter))
                 break
     return found
@@ -110,10 +108,10 @@ def _pile(
 ) -> tuple[float, float] | None:
     """Return the level of a pile of equal readings at the top of a channel, and its scatter."""
     below_top = np.rint((mine.max() - mine) / step).astype(int)  # counts
-    counts = np.bincount(below_top[below_top < 2 * _WIDTH], minlength=2 * _WIDTH)
-    place = int(np.argmax(counts[: _WIDTH + 1]))
+    counts = np.bincount(below_top[below_top < 2 * RAIL_WIDTH], minlength=2 * RAIL_WIDTH)
+    place = int(np.argmax(counts[: RAIL_WIDTH + 1]))
     pile, above, under = int(counts[place]), int(counts[:place].sum()), int(counts[place + 1 : place + 4].max())
-    if pile < PILE or above > _BEYOND_PILE * pile or pile <= _STEEP * under + 4:
+    if pile < PILE or above > BEYOND_PILE * pile or pile <= _STEEP * under + 4:
         return None
     level = float(mine[below_top == place].mean())
     on = below_top <= place
@@ -177,7 +175,7 @@ def _flat(
     under = expected < level - clear
     if (
         scatter > _SCATTER * max(sigma, step)
-        or top - level > _WIDTH * step + _SCATTER * sigma
+        or top - level > RAIL_WIDTH * step + _SCATTER * sigma
         or within.mean() < _ON_IT
         or under.sum() < PILE
         or np.ptp(expected[beyond]) < _SCATTER * max(scatter, sigma, step)
@@ -212,7 +210,7 @@ def on_rails(
         on[:, rail.channel] |= rail.sign * run.readings[:, rail.channel] >= level - margin
         on[:, rail.channel] |= rail.sign * prediction[:, rail.channel] > level - _CLEAR * noise[rail.channel]
     # Of a channel that hardly leaves its rail only the noise would be left.
-    return np.asarray(on | (on.mean(axis=0) > 1.0 - _BEYOND_PILE))
+    return np.asarray(on | (on.mean(axis=0) > 1.0 - BEYOND_PILE))
 
 
 def rail_parameters(
@@ -226,7 +224,7 @@ def rail_parameters(
     sides = {1: "upper", -1: "lower"}
     each = {f"{channels[rail.channel]}_{sides[rail.sign]}_m_s2": rail.level for rail in rails}
     alike = all(abs(abs(rail.level) - limit) < 1.5 * steps[rail.channel] for rail in rails)
-    beyond = np.abs(np.where(run.valid, run.readings, 0.0)) > limit + _WIDTH * steps
+    beyond = np.abs(np.where(run.valid, run.readings, 0.0)) > limit + RAIL_WIDTH * steps
     return {"limit_m_s2": limit, **({} if alike and beyond.sum(axis=0).max() <= GARBAGE else each)}
 
 

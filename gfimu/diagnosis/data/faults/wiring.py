@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.diagnosis.data.run import Run
-from gfimu.world_model import Effect, WorldModel
+from gfimu.model.world_model import Effect, WorldModel
 
 __all__ = ["SIGNIFICANT_RMS", "Fault", "find_wiring", "range_factors", "rewired"]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gfimu.world_model import Spin, SpinState
+from gfimu.model.world_model import Spin, SpinState
 
 __all__ = ["JoinedSpin", "ScaledSpin", "State"]
 

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gfimu.diagnosis.data.run import Run
 from gfimu.diagnosis.data.table.spins import State
-from gfimu.world_model import Effect, SpinState, WorldModel, axis_inclination
+from gfimu.model.world_model import Effect, SpinState, WorldModel, axis_inclination
 
 __all__ = ["AngleReading", "gravity_angle"]
 

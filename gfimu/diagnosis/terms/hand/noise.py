@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
+from gfimu.array.array import AccelerometerArray
 from gfimu.diagnosis.data.cosine_basis import NoiseLevels
 from gfimu.diagnosis.policy import Policy
-from gfimu.geometry.array import AccelerometerArray
 
 __all__ = ["LEAST_POWER", "BodyNoise", "Projection", "learn_motion_noise", "white_from_rows"]
 

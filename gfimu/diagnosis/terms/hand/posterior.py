@@ -28,8 +28,8 @@ from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.terms.columns import Columns
 from gfimu.diagnosis.terms.hand.drive import HandDrive
 from gfimu.diagnosis.terms.hand.noise import LEAST_POWER, BodyNoise, Projection
+from gfimu.model.world_model import Effect
 from gfimu.motion.body_drive import BodyDrive
-from gfimu.world_model import Effect
 
 __all__ = ["HandPosterior", "condition_hand"]
 
@@ -434,7 +434,7 @@ def condition_hand(
 
     Raises
     ------
-    numpy.linalg.LinAlgError
+    NoPredictionError
         If the prediction is not finite.
     """
     if projection is None:
@@ -442,8 +442,6 @@ def condition_hand(
         projection = Projection(stretch.model.array, levels.white[:-1], sensed)
     settled = _settled(stretch, drive, effects, levels, projection)
     channels = stretch.channels(effects, settled.spin)
-    if not np.isfinite(channels).all():
-        raise np.linalg.LinAlgError("the prediction of the free body is not finite")
     residual = np.where(stretch.run.valid, stretch.run.readings - channels, 0.0)
     change = stretch.change_in_motion[stretch.starts]
     common = levels.common(change)

@@ -8,17 +8,17 @@ from functools import cache
 
 import numpy as np
 
+from gfimu.array.array import AccelerometerArray
 from gfimu.diagnosis.data.stretch import Stretch, make_stretches
 from gfimu.diagnosis.diagnose import prepare
 from gfimu.diagnosis.fit.gauss_newton import Fit, fit
 from gfimu.diagnosis.fit.learn import learn_noise, learn_roughness, starting_point
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.terms.cause import Cause
-from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
 from sim.effects import Effect
+from sim.trials.worlds.hidden import Measurement, measure, random_profile
 from sim.twin import Twin
-from sim.worlds.hidden import Measurement, measure, random_profile
 
 Change = Callable[..., None]
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from gfimu.array.array import AccelerometerArray
 from gfimu.diagnosis.criticism.coincidence.bound_numbers import coincidences
 from gfimu.diagnosis.criticism.coincidence.patterns import Pattern, channel_patterns, chip_patterns, distinct
 from gfimu.diagnosis.fit.gauss_newton import Fit
 from gfimu.diagnosis.fit.linear import Point
 from gfimu.diagnosis.terms.cause import Cause
-from gfimu.geometry.array import AccelerometerArray
 from sim.effects import EFFECTS
 
 ARRAY, UPRIGHT = AccelerometerArray.load("cube12"), np.eye(3)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from gfimu.array.array import AccelerometerArray
 from gfimu.diagnosis.criticism.holdout import gate_gains, held_out_gain, other_recordings, split
 from gfimu.diagnosis.data.cosine_basis import NoiseLevels
 from gfimu.diagnosis.data.run import prepare_run
@@ -15,12 +16,11 @@ from gfimu.diagnosis.fit.learn import learn_roughness, starting_point
 from gfimu.diagnosis.fit.linear import with_residue
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.terms.cause import Cause
-from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
 from sim.effects import make_effect
 from sim.motions.profiles import Hold, Ramp, spin_profile
+from sim.trials.worlds.hidden import Measurement, measure, random_profile
 from sim.twin import Twin
-from sim.worlds.hidden import Measurement, measure, random_profile
 
 POLICY = Policy()
 SETTING = Measurement(duration=32.0)
@@ -223,6 +223,7 @@ def test_the_gate_refuses_what_one_half_alone_has(twin, motion, plain):
 # -- other recordings ------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.study
 def test_another_recording_confirms_or_refutes(twin, tilted):
     stretches, found, nothing = tilted
     turning = random_profile(np.random.default_rng(8), SETTING.duration)

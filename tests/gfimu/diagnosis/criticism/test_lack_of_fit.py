@@ -96,6 +96,7 @@ def test_the_jerk_of_the_reference_is_no_sign_beside_a_cause_with_a_memory():
     assert beside.log_odds < found.log_odds
 
 
+@pytest.mark.study
 def test_a_weakly_damped_mode_that_is_fitted_exactly_leaves_no_dependence():
     """The drive's prior is smoother than a table that a mode acts back on: the jerk of its reference has 11 nats."""
     shape = {"frequency_hz": 3.97, "damping_ratio": 0.0125}

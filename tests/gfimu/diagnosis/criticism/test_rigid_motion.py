@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from gfimu.array.array import AccelerometerArray
 from gfimu.diagnosis.criticism.views.rigid_motion import motion_columns, rigid_motion
 from gfimu.diagnosis.data.stretch import make_stretches
 from gfimu.diagnosis.diagnose import prepare
-from gfimu.geometry.array import AccelerometerArray
 from sim.effects import make_effect
+from sim.trials.worlds.hidden import Measurement, measure
 from sim.twin import Twin
-from sim.worlds.hidden import Measurement, measure
 
 SETTING = Measurement(duration=30.0)
 

@@ -13,8 +13,8 @@ from gfimu.diagnosis.fit.linear import energy_of, with_residue
 from gfimu.diagnosis.fit.observed_at import observed_at
 from gfimu.diagnosis.fit.random_walk import walk_strength
 from sim.effects import make_effect
-from sim.study.outcome import calibration_residue
-from sim.worlds.hidden import bias_instability
+from sim.trials.study.outcome import calibration_residue
+from sim.trials.worlds.hidden import bias_instability
 
 
 def test_noise_of_the_data_sheet_is_nothing():

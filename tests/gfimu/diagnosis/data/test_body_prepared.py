@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from made_bodies import TWIN, hand_motion, hand_recording, hand_stretch
 
+from gfimu.base.errors import InputError
 from gfimu.diagnosis.data.body.prepared import prepare_bodies, robust_prediction
-from gfimu.errors import InputError
 
 MOTION = hand_motion()
 WHITE = TWIN.expected_noise(100.0).white

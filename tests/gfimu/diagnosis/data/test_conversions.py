@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gfimu.diagnosis.data.conversions import Conversions, settled
+from gfimu.diagnosis.data.conversions import Conversions
 from gfimu.diagnosis.data.run import Run, prepare_run, smooth_rate
+from gfimu.diagnosis.data.table.settling import settled
 from gfimu.diagnosis.fit.learn import predicted_by_reference
 from gfimu.recording import Recording
 from sim.motions.motion import SpinState

@@ -10,7 +10,7 @@ from core_cases import lively, small_twin
 
 from gfimu.diagnosis.data.prepared_runs import PreparedRuns
 from sim.effects import make_effect
-from sim.worlds.hidden import Measurement, measure
+from sim.trials.worlds.hidden import Measurement, measure
 
 TWIN = small_twin("cube12")
 

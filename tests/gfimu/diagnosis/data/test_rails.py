@@ -9,14 +9,15 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
 
+from gfimu.array.array import AccelerometerArray, Chip
 from gfimu.diagnosis.data.integrity import check_integrity
 from gfimu.diagnosis.data.run import prepare_run
 from gfimu.diagnosis.diagnose import diagnose
-from gfimu.geometry.array import AccelerometerArray, Chip
+from gfimu.recording.importing.oddities import rails_of
 from sim.effects import make_effect
 from sim.motions.motion import SplineSpin
+from sim.trials.worlds.hidden import Measurement, measure
 from sim.twin import Twin
-from sim.worlds.hidden import Measurement, measure
 
 STEP = 3.9e-3 * 9.80665  # m/s²
 TWIN = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
@@ -106,6 +107,7 @@ def test_rails_of_all_channels_at_one_level_are_one_limit():
     assert effect.parameters == {"limit_m_s2": pytest.approx(4.5, abs=STEP)}
 
 
+@pytest.mark.study
 def test_the_extended_twin_clips_as_the_recording_does():
     recording = clipped({"a31": 4.5}, {}, rare)
     found = diagnose([recording], TWIN)
@@ -156,6 +158,41 @@ def test_a_channel_that_stops_at_its_peak_is_stuck():
     readings[peak : peak + 120, 6] = readings[peak - 3, 6]
     report, _ = checked(replace(recording, readings=readings))
     assert [effect.name for effect in report.effects] == ["stuck_channel"]
+
+
+LOWEST = float(np.min(swinging()[0].readings[:, 6]))
+FREEZES = {
+    "at its last value": (0.2, 0.5, None),
+    "for most of the run": (0.25, 0.85, None),
+    "from the start, at zero": (0.0, 0.7, 0.0),
+    "to the end": (0.5, 1.0, None),
+    "throughout": (0.0, 1.0, 1.0),
+    "near its largest value": (0.3, 0.6, float(np.max(swinging()[0].readings[:, 6])) - 6 * STEP),
+    "near its smallest value": (0.5, 0.7, LOWEST + 6 * STEP),
+}
+
+
+@pytest.mark.parametrize("freeze", FREEZES)
+@pytest.mark.parametrize("chip", [False, True])
+def test_a_channel_that_freezes_within_its_range_is_stuck_for_that_time(freeze, chip):
+    """Alone, or with the two others of its chip; and no rail of the readings alone is found either."""
+    begin, end, value = FREEZES[freeze]
+    recording, _ = swinging()
+    readings, n = recording.readings.copy(), len(recording)
+    rows = slice(round(begin * n), round(end * n))
+    places = [6, 7, 8] if chip else [6]
+    for place in places:
+        level = (
+            readings[max(rows.start - 1, 0), place] if value is None or place != 6 else np.round(value / STEP) * STEP
+        )
+        readings[rows, place] = level
+    report, _ = checked(replace(recording, readings=readings))
+    (effect,) = report.effects
+    assert effect.name == "stuck_channel"
+    assert np.atleast_1d(effect.parameters["channel"]).tolist() == [NAMES[place] for place in places]
+    assert effect.parameters["start_s"] == pytest.approx(recording.t_s[rows.start], abs=0.05)
+    assert effect.parameters["stop_s"] == pytest.approx(recording.t_s[min(rows.stop, n - 1)], abs=0.05)
+    assert not any(rails_of(readings[:, place]) for place in places)
 
 
 def test_a_recording_that_repeats_its_last_frame_has_no_stuck_channel():

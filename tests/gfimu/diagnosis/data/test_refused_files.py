@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from core_cases import lively, small_twin, stretches_of
 
+from gfimu.base.errors import InputError
 from gfimu.diagnosis.data.plausibility import refuse_implausible
-from gfimu.errors import InputError
 
 TWIN = small_twin("cube12")
 

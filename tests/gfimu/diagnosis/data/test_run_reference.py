@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gfimu.base.errors import InputError
 from gfimu.diagnosis.data.reference import (
     BRIDGED_GAP,
     REFERENCE_COLUMNS,
@@ -16,7 +17,6 @@ from gfimu.diagnosis.data.reference import (
     unreferenced,
 )
 from gfimu.diagnosis.data.time_grid import time_grid
-from gfimu.errors import InputError
 from gfimu.recording import Recording
 from sim.twin import Twin
 

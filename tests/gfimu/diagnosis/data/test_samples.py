@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from made_runs import PERIOD, made_run, without
 
-from gfimu.diagnosis.data.samples import channel_spikes, frozen_fault, frozen_stretches, reference_spikes
+from gfimu.diagnosis.data.samples import channel_spikes, frozen_fault, frozen_stretches, is_at_extreme, reference_spikes
 
 N, SIGMA, STEP = 1000, 0.05, 0.04
 T = PERIOD * np.arange(N)
@@ -63,7 +63,7 @@ def test_a_channel_that_holds_one_value_while_it_should_move():
     readings = np.round(READINGS / STEP) * STEP
     readings[200:500, 0] = readings[200, 0]
     noise = np.full(2, SIGMA)
-    ((channel, start, stop),) = frozen_stretches(made_run(readings), SMOOTH, STEP, None, noise)
+    ((channel, start, stop),) = frozen_stretches(made_run(readings), SMOOTH, STEP, noise)
     assert channel == 0
     assert abs(start - 200) <= 1
     assert abs(stop - 500) <= 1
@@ -76,11 +76,11 @@ def test_a_channel_that_holds_one_value_while_it_should_move():
 def test_what_is_not_frozen():
     noise = np.full(2, SIGMA)
     readings = np.round(READINGS / STEP) * STEP
-    assert frozen_stretches(made_run(readings), SMOOTH, STEP, None, noise) == []
+    assert frozen_stretches(made_run(readings), SMOOTH, STEP, noise) == []
     # At a limit a channel may stay.
-    clipped = np.minimum(readings, 2.0)
-    assert frozen_stretches(made_run(clipped), SMOOTH, STEP, 2.0, noise) == []
+    clipped = made_run(np.minimum(readings, 2.0))
+    assert all(is_at_extreme(clipped, held, STEP, SIGMA) for held in frozen_stretches(clipped, SMOOTH, STEP, noise))
     # Where all channels repeat themselves no single one has stopped.
     both = readings.copy()
     both[200:500] = both[200]
-    assert frozen_stretches(made_run(both), SMOOTH, STEP, None, noise) == []
+    assert frozen_stretches(made_run(both), SMOOTH, STEP, noise) == []

@@ -14,7 +14,7 @@ from gfimu.diagnosis.data.stretch import RunUp, make_stretches
 from gfimu.diagnosis.fit.learn import starting_point
 from gfimu.diagnosis.terms.drive import Drive
 from sim.effects import make_effect
-from sim.worlds.hidden import Measurement, measure
+from sim.trials.worlds.hidden import Measurement, measure
 
 
 @pytest.fixture(scope="module")

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
+from gfimu.array.array import AccelerometerArray
 from gfimu.diagnosis import diagnose
 from gfimu.diagnosis.data.rounding import between_steps
-from gfimu.geometry.array import AccelerometerArray
 from sim.effects import make_effect
+from sim.trials.worlds.hidden import Measurement, measure
 from sim.twin import Twin
-from sim.worlds.hidden import Measurement, measure
 
 STEP = 1 / 16
 
@@ -61,6 +61,7 @@ def test_what_has_no_steps_to_see_is_left_as_it_is(values):
     assert_array_equal(between_steps(np.arange(len(values)) / 100.0, values), values)
 
 
+@pytest.mark.study
 def test_a_strong_dependence_on_temperature_leaves_nothing_for_others():
     twin = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12", sample_rate=400.0)
     drawn = np.random.default_rng(21).standard_normal(12)

@@ -8,14 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import RecordingWarning
 from gfimu.diagnosis.data.run import prepare_run
 from gfimu.diagnosis.data.time_grid import time_grid
 from gfimu.diagnosis.diagnose import diagnose
-from gfimu.errors import RecordingWarning
-from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
+from sim.trials.worlds.hidden import Measurement, measure
 from sim.twin import Twin
-from sim.worlds.hidden import Measurement, measure
 
 PERIOD = 0.01
 LATE = {
@@ -121,7 +121,7 @@ def test_jitter_is_reported_and_is_no_lost_frame():
     twin, recording = recorded()
     found = diagnose([recording], twin)
     assert (found.verdict, found.causes) == ("nothing_found", ())
-    assert found.noise["time_jitter_s"] == pytest.approx(1.2e-3, rel=0.15)  # of |N(0, 2 ms)|
+    assert found.noise.time_jitter_s == pytest.approx(1.2e-3, rel=0.15)  # of |N(0, 2 ms)|
     assert any("scatter by 1.2 ms rms" in sentence for sentence in found.sentences)
 
 
@@ -132,7 +132,7 @@ def test_lost_frames_are_found_beside_jitter():
     (cause,) = found.causes
     assert cause.effect == "dropped_frames"
     assert cause.parameters["count"] == whole - len(recording) > 10
-    assert "time_jitter_s" in found.noise
+    assert found.noise.time_jitter_s
 
 
 def test_corrupt_values_are_left_out_and_counted(tmp_path):

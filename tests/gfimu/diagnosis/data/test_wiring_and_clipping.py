@@ -9,8 +9,8 @@ from gfimu.diagnosis.data.faults.clipping import clipping_level, own_rails
 from gfimu.diagnosis.data.faults.wiring import find_wiring, range_factors, rewired
 from gfimu.diagnosis.data.run import prepare_run
 from sim.effects import make_effect
+from sim.trials.worlds.hidden import Measurement, measure, random_profile
 from sim.twin import Twin
-from sim.worlds.hidden import Measurement, measure, random_profile
 
 TWIN = Twin.load("cube12_turntable")
 SETTING = Measurement(duration=20.0)

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from gfimu.base.errors import InputError
 from gfimu.diagnosis.data.run import prepare_run
 from gfimu.diagnosis.design.ambiguity import open_effects
 from gfimu.diagnosis.design.design import Limits, design
@@ -21,11 +22,10 @@ from gfimu.diagnosis.design.planned_run import planned
 from gfimu.diagnosis.design.profile_search import plain_profile, profile_of, starting_points
 from gfimu.diagnosis.design.proposal import SEPARATED
 from gfimu.diagnosis.diagnose import diagnose
-from gfimu.errors import InputError
 from sim.effects import make_effect
 from sim.scenarios import Scenario
+from sim.trials.worlds.hidden import Measurement, measure, random_profile
 from sim.twin import Twin
-from sim.worlds.hidden import Measurement, measure, random_profile
 
 LIMITS = Limits(rate=15.0, acceleration=20.0, duration=30.0)
 
@@ -265,6 +265,7 @@ def test_a_random_profile_is_a_start_like_any_other(twin):
     assert proposal.after.least_nats > 0.5 * usual > SEPARATED
 
 
+@pytest.mark.study
 def test_from_an_open_verdict_to_a_closed_one(twin, tmp_path):
     gravity = make_effect("gravity", {"delta_m_s2": 0.03})
     setting = Measurement(duration=10.0)

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import nnls
 
+from gfimu.base.errors import InputError
 from gfimu.diagnosis.design.distinguishability import (
     Contender,
     PlannedRun,
@@ -22,7 +23,6 @@ from gfimu.diagnosis.design.table_profile import Leg, TableProfile
 from gfimu.diagnosis.fit.linear import linearise
 from gfimu.diagnosis.terms.columns import Columns
 from gfimu.diagnosis.terms.library import family_columns
-from gfimu.errors import InputError
 from sim.effects import make_effect
 from sim.twin import Twin
 

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import InputError
 from gfimu.diagnosis.design.run_check import check_runs, turns_one_way
-from gfimu.errors import InputError
-from gfimu.geometry.array import AccelerometerArray
 from gfimu.recording import Recording
+from sim.trials.worlds.hidden import Measurement, measure
 from sim.twin import Twin
-from sim.worlds.hidden import Measurement, measure
 
 TWIN = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
 
@@ -31,8 +31,8 @@ def test_a_run_of_many_speeds_shows_most_effects(run):
     assert "sensor_position" in views(found)["eccentricity"].confused_with
     assert any("on its side" in line for line in found.advice)
     (facts,) = found.runs
-    assert facts["duration_s"] == pytest.approx(40.0, abs=0.1)
-    assert facts["share_forwards"] > 0.05
+    assert facts.duration_s == pytest.approx(40.0, abs=0.1)
+    assert facts.share_forwards > 0.05
 
 
 def test_a_short_slow_run_of_one_way_is_told_what_it_lacks(run):

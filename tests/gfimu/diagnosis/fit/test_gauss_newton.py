@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from core_cases import cause_of, lively, small_twin, stretches_of
+from scipy.interpolate import CubicSpline
 
 from gfimu.diagnosis.data.cosine_basis import NoiseLevels
 from gfimu.diagnosis.fit.gauss_newton import SETTLED, fit, linearly_without, log_prior
@@ -93,3 +95,82 @@ def test_prior_of_a_set():
     assert log_prior((), POLICY) == 0.0
     assert log_prior((one,), POLICY) == -3.0
     assert log_prior((one, other), POLICY) == -8.0 + POLICY.extra_cause
+
+
+class Bounded:
+    """A simulation that answers only as long as its table is tilted by no more than a bound."""
+
+    def __init__(self, monkeypatch, bound, failing):
+        self.refused, usual = 0, type(TWIN).predict
+
+        def predict(twin, spin, t, *, effects=(), **more):
+            if any(abs(effect.parameters.get("x_rad", 0.0)) > bound for effect in effects):
+                self.refused += 1
+                return failing(*usual(twin, spin, t, effects=effects, **more))
+            return usual(twin, spin, t, effects=effects, **more)
+
+        monkeypatch.setattr(type(TWIN), "predict", predict)
+
+
+def not_finite(channels, reference):
+    return channels * np.nan, reference
+
+
+def overflowing(channels, reference):
+    return np.exp(1e3 * np.abs(channels) + 1e3), reference
+
+
+def without_spline(channels, reference):
+    return CubicSpline(np.arange(len(channels)), channels * np.nan)(0.0), reference
+
+
+def singular(channels, reference):
+    return np.linalg.solve(np.zeros((2, 2)), np.ones(2)), reference
+
+
+def dividing(channels, reference):
+    return channels / math.sin(0 // int(channels.size < 0)), reference
+
+
+@pytest.mark.parametrize("failing", [not_finite, overflowing, without_spline, singular, dividing])
+def test_a_step_to_where_there_is_no_prediction_is_rejected_and_shortened(monkeypatch, failing):
+    hidden = cause_of("table_tilt", ARRAY, [1.5, -0.8])
+    stretches, point = started([hidden.effect(ARRAY, 0)])
+    start = replace(point, causes=(hidden.at(np.zeros(2)),))
+    whole = fit(stretches, start, POLICY)
+    (x, _) = whole.causes[0].effect(ARRAY, 0).parameters.values()
+    world = Bounded(monkeypatch, 0.7 * abs(x), failing)
+    found = fit(stretches, start, POLICY)
+    assert world.refused
+    assert abs(found.causes[0].effect(ARRAY, 0).parameters["x_rad"]) <= 0.7 * abs(x)
+    assert whole.objective < found.objective < energy_of(stretches, start)
+    assert energy_of(stretches, whole.point) == np.inf
+
+
+def test_learning_does_not_move_a_drive_to_where_there_is_no_prediction(monkeypatch):
+    stretches, point = started()
+    drive = point.drives[0]
+    pushed = replace(point, drives=(drive.moved(np.full(len(drive.coefficients), 0.3)),))
+    usual = type(TWIN).predict
+    held = pushed.drives[0].spin.at(stretches[0].run.t).angle
+
+    def predict(twin, spin, t, **more):
+        channels, reference = usual(twin, spin, t, **more)
+        far = np.abs(spin.at(t).angle[: len(held)] - held[: len(t)]).max() > 1e-3
+        return channels * (np.nan if far else 1.0), reference
+
+    monkeypatch.setattr(type(TWIN), "predict", predict)
+    learnt = learn_roughness(stretches, pushed, 3)
+    assert np.isfinite(learnt.drives[0].roughness).all()
+    assert np.abs(learnt.drives[0].spin.at(stretches[0].run.t).angle - held).max() <= 1e-3
+
+
+def test_faults_of_a_simulation_itself_are_raised(monkeypatch):
+    stretches, point = started()
+
+    def predict(twin, spin, t, **more):
+        raise KeyError("a key that is missing")
+
+    monkeypatch.setattr(type(TWIN), "predict", predict)
+    with pytest.raises(KeyError, match="missing"):
+        fit(stretches, point, POLICY)

@@ -3,12 +3,17 @@
 import multiprocessing
 import os
 import signal
+import subprocess
+import sys
+import threading
 import time
+from pathlib import Path
 
 import pytest
 
 from gfimu.diagnosis.fit import parallel
 from gfimu.diagnosis.fit.parallel import each_apart, over_segments
+from gfimu.diagnosis.time_limit import TIME_LIMIT, check_time, limited_to, unlimited
 
 
 def test_results_come_in_the_order_of_the_items():
@@ -91,3 +96,83 @@ def test_segments_are_worked_on_here():
 
     assert over_segments(change, [1, 2, 3], [10, 20, 30]) == [11, 22, 33]
     assert state["changed"] == 3
+
+
+PARENT = """
+import os, sys, time
+from gfimu.diagnosis.fit import parallel
+parallel._processors = lambda: 2
+def work(number):
+    os.write(1, f"{os.getpid()}\\n".encode())
+    time.sleep(60)
+parallel.each_apart(work, range(2))
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="processes are split off on Linux only")
+def test_no_process_lives_on_when_its_parent_ends():
+    usual = {"stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
+    numbers = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
+    parents = {number: subprocess.Popen([sys.executable, "-c", PARENT], **usual) for number in numbers}
+    for number, parent in parents.items():
+        workers = [int(parent.stdout.readline()) for _ in range(2)]
+        parent.send_signal(number)
+        parent.wait(timeout=10)
+        until = time.monotonic() + 2.0
+        while any(map(is_running, workers)) and time.monotonic() < until:
+            time.sleep(0.05)
+        assert not any(map(is_running, workers)), number
+
+
+def is_running(number):
+    """Whether a process has not ended; one that nobody has asked for its exit code has."""
+    try:
+        return Path(f"/proc/{number}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+@pytest.mark.usefixtures("several_processors")
+def test_what_is_done_is_kept_when_the_time_is_over():
+    def work(number):
+        time.sleep(0.1 * number)
+        check_time()
+        return number
+
+    kept = []
+    with pytest.raises(KeyboardInterrupt, match=TIME_LIMIT), limited_to(0.35):
+        each_apart(work, range(9), keep=kept.append)
+    assert kept[:2] == [0, 1]
+    assert len(kept) < 6
+    assert not multiprocessing.active_children()
+
+
+def test_threads_end_with_what_they_work_for(monkeypatch):
+    monkeypatch.setattr(parallel, "_processors", lambda: 2)
+    ended, begun = [], threading.Event()
+
+    def work(number):
+        if number == 0:
+            assert begun.wait(10.0)
+            raise KeyboardInterrupt
+        begun.set()
+        until = time.monotonic() + 20.0
+        while time.monotonic() < until:
+            try:
+                check_time()
+            except KeyboardInterrupt:
+                ended.append(number)
+                raise
+
+    with limited_to(100.0), pytest.raises(KeyboardInterrupt):
+        over_segments(work, range(2))
+    assert ended == [1]
+    check_time()
+
+
+def test_an_inner_limit_is_no_longer_than_the_outer_one():
+    with limited_to(-1.0):
+        with limited_to(100.0), pytest.raises(KeyboardInterrupt):
+            check_time()
+        with unlimited():
+            check_time()

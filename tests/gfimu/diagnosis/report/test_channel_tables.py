@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from made_runs import PERIOD, made_view
 
+from gfimu.array.array import AccelerometerArray, Chip
 from gfimu.diagnosis.criticism.views.dependence import Fingerprint
 from gfimu.diagnosis.criticism.views.residuals import residual_views
 from gfimu.diagnosis.report.channel_tables import channel_bars, fingerprint_rows
-from gfimu.geometry.array import AccelerometerArray, Chip
 
 ARRAY = AccelerometerArray(
     "four", (Chip("a1", np.zeros(3), np.eye(3)), Chip("a2", np.array([0.1, 0.0, 0.0]), np.eye(3)[:1]))

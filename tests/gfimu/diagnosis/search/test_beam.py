@@ -10,12 +10,12 @@ import pytest
 from core_cases import cause_of, lively, small_twin, stretches_of
 from numpy.testing import assert_allclose
 
+from gfimu.array.array import AccelerometerArray
 from gfimu.diagnosis.fit.evidence import SCALES, log_evidence
 from gfimu.diagnosis.fit.learn import starting_point
 from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.search.beam import Blocks, leading_sets
+from gfimu.diagnosis.search.beam import Blocks, leading_sets, promise
 from gfimu.diagnosis.search.screening import Signature, hypotheses_of, screen
-from gfimu.geometry.array import AccelerometerArray
 from sim.effects import make_effect
 
 TWIN, CUBE = small_twin(), small_twin("cube12")
@@ -26,6 +26,15 @@ TRUTH = cause_of("table_tilt", TWIN.array, [1.0, -0.5])
 def blocks():
     stretches = stretches_of(TWIN, [TRUTH.effect(TWIN.array, 0)], duration=6.0, motion=lively())
     return Blocks(screen(stretches, starting_point(stretches, 0.1)), Policy())
+
+
+def test_other_effects_promise_what_they_bring(blocks):
+    tilt = blocks.causes([blocks.nearest(TRUTH)])
+    assert promise(blocks, (), {"table_tilt"}, Policy()) > 20.0
+    assert promise(blocks, (), {"clock_error"}, Policy()) < promise(blocks, (), {"table_tilt"}, Policy())
+    # Beside the truth others bring no more than chance, less their prior.
+    assert promise(blocks, tilt, {"cogging", "quadratic", "clock_error"}, Policy()) < 0.0
+    assert promise(blocks, tilt, {"not in the library"}, Policy()) == -np.inf
 
 
 def block_of(blocks, members):
@@ -78,6 +87,7 @@ def best_of_each_set_of_names(blocks):
     return list(found.values())
 
 
+@pytest.mark.study
 def test_leading_sets_are_the_best_of_each_set_of_names_whose_members_all_add_something(blocks):
     policy = Policy()
     sets = leading_sets(blocks, 2, policy)

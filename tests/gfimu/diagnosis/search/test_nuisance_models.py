@@ -22,6 +22,7 @@ def test_neither_in_noise():
     assert found.explanation.best.causes == ()
 
 
+@pytest.mark.study
 def test_a_random_walk_is_found_with_its_strength():
     walk = [make_effect("bias_random_walk", {"strength_m_s2_rts": 0.04})]
     found = understand(stretches_of(small_twin(), walk, seed=3, duration=10.0), Policy())
@@ -32,6 +33,7 @@ def test_a_random_walk_is_found_with_its_strength():
     assert found.log_odds > 0.0
 
 
+@pytest.mark.study
 def test_a_residue_of_the_calibration_is_found():
     twin, rng = small_twin(), np.random.default_rng(5)
     effects = [

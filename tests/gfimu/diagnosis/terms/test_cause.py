@@ -37,6 +37,13 @@ def test_an_effect_that_each_run_has_anew_has_its_own_sizes():
     assert_allclose(second, pattern.mixing @ cause.coordinates[count:])
 
 
+@pytest.mark.parametrize(("damping", "ends"), [(1e-3, True), (1.01e-3, False), (0.29, False), (0.3, True)])
+def test_a_shape_at_the_end_of_its_range_is_noticed(damping, ends):
+    mode = cause_of("resonance", ARRAY, [0.5], frequency_hz=8.0, damping_ratio=damping)
+    assert mode.at_limits(ARRAY) == (["damping_ratio"] if ends else [])
+    assert cause_of("table_tilt", ARRAY, [1e6, 0.0]).at_limits(ARRAY) == []  # which has no such range
+
+
 def test_what_is_positive_stays_so():
     lag = cause_of("sensor_lag", ARRAY, [0.5])
     low, high = lag.limits(ARRAY)

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
 
+from gfimu.array.array import AccelerometerArray, Chip
+from gfimu.array.turning_axis import TurningAxis
 from gfimu.diagnosis.data.body.run import prepare_body_run
 from gfimu.diagnosis.data.body.stretch import make_body_stretches
 from gfimu.diagnosis.fit.gauss_newton import determined, fit
@@ -21,8 +23,6 @@ from gfimu.diagnosis.terms.hand.drive import HandDrive
 from gfimu.diagnosis.terms.hand.learning import first_noise
 from gfimu.diagnosis.terms.hand.posterior import condition_hand
 from gfimu.diagnosis.terms.library import family_columns
-from gfimu.geometry.array import AccelerometerArray, Chip
-from gfimu.geometry.turning_axis import TurningAxis
 from gfimu.motion.body_drive import BodyDrive
 from gfimu.recording import Recording
 from sim.effects import make_effect

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from gfimu.array.array import AccelerometerArray
 from gfimu.diagnosis.terms.reach import behind_wiring, disjoint
-from gfimu.geometry.array import AccelerometerArray
 from gfimu.motion.body_drive import BodyDrive
 from sim.effects import BODY_EFFECTS, make_effect
 from sim.twin import Twin

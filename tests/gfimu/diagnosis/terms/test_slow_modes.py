@@ -152,6 +152,7 @@ def offset_in_standard_deviations(modes, residual, weight, column):
     return float(residual[:, column] @ whitened / WHITE / np.sqrt(constant @ whitened))
 
 
+@pytest.mark.study
 def test_an_offset_is_as_uncertain_as_slow_noise_at_the_edges_of_steps_makes_it():
     rng = np.random.default_rng(4)
     basis, channels = CosineBasis(6000, PERIOD), 12

@@ -16,7 +16,8 @@ from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.explain import explain
 from gfimu.diagnosis.search.nuisance_models import Understanding
 from gfimu.diagnosis.verdict.conclude import conclude, is_dominant, is_unknown, named_causes
-from sim.worlds.hidden import Measurement, measure
+from sim.effects import make_effect
+from sim.trials.worlds.hidden import Measurement, measure
 
 TWIN = small_twin()
 HIDDEN = cause_of("table_tilt", TWIN.array, [1.0, -0.5])
@@ -63,6 +64,19 @@ def test_an_unknown_verdict_names_no_cause_and_extends_no_twin(prepared, underst
     assert found.twin.effects == ()
     assert found.unexplained.significant
     assert "rate²" in found.unexplained.signature
+
+
+def test_what_explains_most_comes_first(prepared, understanding, monkeypatch):
+    monkeypatch.setattr("gfimu.diagnosis.verdict.conclude.white_factor", lambda *_: (2.0, 0.1))
+    steps = {"large": 5.0, "small": 0.01}  # m/s²
+    for size, step in steps.items():
+        fault = make_effect("coarse_resolution", {"step_m_s2": step}, TWIN.array)
+        with_fault = replace(prepared, effects=((fault,),))
+        names = [one.effect for one in conclude(with_fault, understanding, NOTHING_LEFT, Gain(), POLICY).causes]
+        first = ["coarse_resolution", "table_tilt"] if size == "large" else ["table_tilt", "coarse_resolution"]
+        assert names == [*first, "noise"]
+    unknown = conclude(prepared, understanding, LackOfFit(500.0, "a", {}), Gain(), POLICY, unknown=True)
+    assert unknown.causes == ()  # noise is no cause beside what nothing explains
 
 
 def test_a_rival_as_probable_makes_it_ambiguous(prepared, understanding):

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gfimu.array.array import AccelerometerArray
 from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.verdict.gate import impossible_sizes, judge, measurable
 from gfimu.diagnosis.verdict.parts import NamedCause, Residual, Unexplained
 from gfimu.diagnosis.verdict.wording import verdict_sentences
-from gfimu.geometry.array import AccelerometerArray
 from sim.effects import EFFECTS
 from sim.twin import Twin
 
@@ -66,6 +66,20 @@ def test_causes_are_withdrawn_by_the_figure_that_speaks_against_them(gain, resid
 )
 def test_causes_stand_where_no_figure_speaks_against_them(gain, residual):
     assert not judge(gain, residual, CAUSES).withdrawn
+
+
+@pytest.mark.parametrize(
+    ("after", "significant", "withdrawn"),
+    [(0.06, True, False), (0.09, True, True), (0.09, False, False), (0.036, True, False)],
+)
+def test_causes_beside_something_as_large_are_withdrawn(after, significant, withdrawn):
+    """Half of the squared error beyond noise, 0.11² − 0.0335², is left at 0.0813 m/s²."""
+    left = Unexplained(significant, "a line at 3 Hz")
+    found = judge(GOOD, replace(FITS, rms_after=after), CAUSES, Policy(), left)
+    assert found.withdrawn is withdrawn
+    assert found.why == (
+        "the causes found (tacho_scale) leave 64 % of the error beyond noise: a line at 3 Hz" if withdrawn else ""
+    )
 
 
 def test_a_gain_within_the_noise_is_no_figure():

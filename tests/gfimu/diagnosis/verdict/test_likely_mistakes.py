@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gfimu.array.array import AccelerometerArray
 from gfimu.diagnosis.diagnose import diagnose, prepare
 from gfimu.diagnosis.fit.learn import predicted_by_reference
 from gfimu.diagnosis.verdict.likely_mistakes import likely_mistake
-from gfimu.geometry.array import AccelerometerArray
 from sim.effects import make_effect
+from sim.trials.worlds.hidden import Measurement, measure
 from sim.twin import Twin
-from sim.worlds.hidden import Measurement, measure
 
 CUBE = AccelerometerArray.load("cube12")
 TWIN = Twin(array=CUBE, array_name="cube12")
@@ -51,6 +51,19 @@ def test_swapped_channels_are_named(sound):
     one, other = CUBE.channels[1], CUBE.channels[4]
     assert found.text == f"{WRONG} ({one} reads {other}, {other} reads {one})"
     assert found.after < 0.1 * found.before
+
+
+@pytest.mark.parametrize(("share", "named"), [(0.5, True), (0.9, False)])
+def test_a_chip_at_another_place_is_named(share, named):
+    """A chip at half its arm is a mistake of the files; one that is a little off is an effect of the library."""
+    places = CUBE.chip_positions.copy()
+    places[1] *= [share, share, 1.0]
+    world = measure(
+        np.random.default_rng(9), TWIN.with_array(CUBE.with_geometry(places, [c.axes for c in CUBE.chips])), [], SHORT
+    )
+    found = mistake_in(world)
+    seen = found.text if found is not None else ""
+    assert (seen == "chip a2 reads as if at (0.025, -0.025, -0.050) m, not at (0.050, -0.050, -0.050) m") is named
 
 
 def test_a_wrong_sign_is_named(sound):
@@ -92,6 +105,7 @@ def test_another_array_of_the_library_is_named():
     assert other in mistake_in(recording).text
 
 
+@pytest.mark.study
 def test_a_diagnosis_says_which_mistake_fits(sound):
     order = np.r_[3:12, 0:3]
     found = diagnose([reordered(sound, order, 1.0)], TWIN)

@@ -23,6 +23,7 @@ from gfimu.diagnosis.verdict.naming import (
     contested,
     fault_causes,
     mimics,
+    name_cause,
     probabilities,
     rival_list,
 )
@@ -129,6 +130,23 @@ def test_rivals_and_why_they_lost():
     assert "fits worse: χ² is larger by 110" in rivals[0].why
     assert "needs 11 more free numbers" in rivals[1].why
     assert "larger by 800" in rivals[2].why
+
+
+def test_a_rival_that_is_more_probable_is_not_called_less_so():
+    (rival, _) = rival_list(explanation_of(fit_of(("bias",), 0.0), fit_of(("bias", "cogging"), 1.5)), POLICY)
+    assert rival.why.startswith("it is more probable, but its further causes bring less than a cause must")
+
+
+@pytest.mark.parametrize(("gain", "sure"), [(1.2499, True), (1.25, False)])
+def test_a_size_at_its_limit_is_not_sure(gain, sure):
+    family = EFFECTS["resonance"]
+    (size,) = family.sizes(ARRAY)
+    mode = cause_of("resonance", ARRAY, [gain / size.prior_std], frequency_hz=8.0, damping_ratio=0.02)
+    mode = replace(mode, covariance=1e-6 * np.eye(1))
+    best = Fit(Point((mode,), (), ()), 0.0, 0.0, 100.0, np.zeros((0, 0)), np.zeros(0))
+    found = name_cause(explanation_of(best), best, mode, {"resonance": 0.997}, ARRAY, {}, POLICY)
+    assert found.probability == (0.997 if sure else 1.0 - POLICY.small)
+    assert ("gain stands at the end of its range, so that its size is not known" in found.why) is not sure
 
 
 def test_faults_of_the_samples_are_named_once():

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from few_effects import having
 
+from gfimu.array.array import AccelerometerArray
 from gfimu.diagnosis.data.stretch import make_stretches
 from gfimu.diagnosis.diagnose import diagnose, prepare
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.report.page import report_html
 from gfimu.diagnosis.verdict.place import with_place
-from gfimu.geometry.array import AccelerometerArray
+from sim.trials.worlds.hidden import Measurement, measure
 from sim.twin import Twin
-from sim.worlds.hidden import Measurement, measure
 
 TWIN = having(
     Twin(array=AccelerometerArray.load("cube12"), array_name="cube12"), "eccentricity", "scale_factor", "table_tilt"
@@ -43,6 +43,7 @@ def test_an_unknown_verdict_says_where_its_cause_is(found):
     assert found.unexplained.mistake == ""
 
 
+@pytest.mark.study
 def test_a_report_has_its_picture_and_its_sentence(found):
     page = report_html(found)
     assert "whose motion is it?" in page

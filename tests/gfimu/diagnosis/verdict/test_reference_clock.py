@@ -8,12 +8,12 @@ from dataclasses import replace
 import pytest
 from made_diagnoses import made_diagnosis
 
-from gfimu.diagnosis.verdict.parts import NamedCause
+from gfimu.diagnosis.verdict.parts import NamedCause, ReferenceClock
 from gfimu.diagnosis.verdict.sample_notes import with_reference_clock
 from sim.twin import Twin
 
 TWIN = Twin.load("cube12_turntable")
-CLOCK = {"offset_s": -3.05, "offset_std_s": 0.002, "rate_error": 0.003, "rate_error_std": 2e-5}
+CLOCK = ReferenceClock(offset_s=-3.05, offset_std_s=0.002, rate_error=0.003, rate_error_std=2e-5)
 
 
 def test_a_rate_error_that_was_taken_off_is_a_cause():
@@ -25,7 +25,7 @@ def test_a_rate_error_that_was_taken_off_is_a_cause():
         "By the alignment of the two the channels' clock was 3.05 ± 0.002 s behind the reference's at the first sample "
         "and is 0.3 ± 0.002 % fast against it. The extended twin does not hold this: it is of the aligned recording."
     )
-    assert json.loads(found.to_json())["reference_clock"] == CLOCK
+    assert json.loads(found.to_json())["reference_clock"] == CLOCK.to_dict()
 
 
 def test_a_displaced_reference_is_late_by_minus_the_offset():

@@ -6,11 +6,12 @@ from dataclasses import replace
 import pytest
 from made_diagnoses import made_diagnosis
 
+import gfimu
+from gfimu.base.errors import InputError
 from gfimu.diagnosis.report.picture import _notes
 from gfimu.diagnosis.report.plain_words import parameter_units
 from gfimu.diagnosis.verdict.parts import NamedCause
 from gfimu.diagnosis.verdict.verdict import Diagnosis
-from gfimu.errors import InputError
 
 
 def test_one_line():
@@ -34,7 +35,7 @@ def test_the_picture_prints_a_parameter_in_the_unit_that_its_effect_declares():
 
 def test_the_parts_write_themselves_as_the_contract_has_them():
     found = made_diagnosis("unknown")
-    written = json.loads(found.to_json())
+    written = json.loads(Diagnosis.to_json(found))
     assert written["residual"]["unit"] == "m/s2"
     assert written["residual"]["after_by_channel"] == pytest.approx(dict(found.residual.after_by_channel))
     assert written["gain"]["held_out_rms_before"] == pytest.approx(found.gain.rms_before, nan_ok=True)
@@ -48,4 +49,4 @@ def test_a_diagnosis_writes_its_folder_as_the_command_does(tmp_path):
     taken = tmp_path / "file"
     taken.write_text("", encoding="utf-8")
     with pytest.raises(InputError, match="file"):
-        Diagnosis.report(made_diagnosis(), taken)
+        gfimu.write_report(made_diagnosis(), taken)

@@ -47,7 +47,9 @@ def test_what_is_left_is_told_from_a_tenth_of_the_noise_on(after, says):
     words = told("explained", [TILT], residual=residual, rest="a11 follows the rate")
     assert any("times the noise (a11 follows the rate)" in one for one in words) == says
     significant = told("explained", [TILT], residual=residual, unexplained=Unexplained(True, "a tone in a11"))
-    assert "A significant residual remains that nothing in the library explains: a tone in a11." in significant
+    rest = "3.2 % of the error beyond noise" if says else "hardly more than noise"
+    assert f"A significant residual remains that nothing in the library explains, {rest}: a tone in a11." in significant
+    assert significant[0] == "The simulation is wrong in part because of table_tilt."  # never explained beside a rest
     assert not any("times the noise" in one for one in significant)
 
 

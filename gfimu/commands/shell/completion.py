@@ -1,0 +1,111 @@
+"""The values that a shell offers for arguments and options: names of shipped files, effects, methods and fixed words.
+
+Each function returns names with a description, which may be empty. Where none fits, the shell offers file names.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+__all__ = [
+    "Offer",
+    "arrays",
+    "beginning",
+    "effects",
+    "frames",
+    "maps",
+    "objectives",
+    "parts",
+    "scenarios",
+    "shown",
+    "twins",
+    "words",
+]
+
+Values = list[tuple[str, str]]
+
+_UNKNOWN = "unknown"  # stands in the catalogue for what no effect explains; no run can be designed for it
+
+
+@dataclass(frozen=True)
+class Offer:
+    """A word that a shell offers, with its description."""
+
+    value: str
+    help: str = ""
+    type: str = "plain"
+
+
+def words(*fixed: str) -> Callable[[str], Values]:
+    """Return the function that offers fixed words."""
+
+    def offer(incomplete: str) -> Values:
+        return beginning(incomplete, fixed)
+
+    return offer
+
+
+def arrays(incomplete: str) -> Values:
+    """Offer the arrays that come with gfimu."""
+    return _models("arrays", incomplete)
+
+
+def parts(incomplete: str) -> Values:
+    """Offer the parts that come with gfimu."""
+    return _models("parts", incomplete)
+
+
+def maps(incomplete: str) -> Values:
+    """Offer the column maps that come with gfimu."""
+    return _models("maps", incomplete)
+
+
+def scenarios(incomplete: str) -> Values:
+    """Offer the scenarios that come with gfimu."""
+    return _models("scenarios", incomplete)
+
+
+def twins(incomplete: str) -> Values:
+    """Offer the twins that come with gfimu."""
+    return _models("twins", incomplete)
+
+
+def frames(incomplete: str) -> Values:
+    """Offer the frame formats that come with gfimu, and those that are built in."""
+    return [*beginning(incomplete, ("lpc1768", "mimu4444")), *_models("frames", incomplete)]
+
+
+def effects(incomplete: str) -> Values:
+    """Offer the effects of the library; those of other packages are not offered, as this would load them."""
+    return [one for one in _catalogued(incomplete) if one[0] != _UNKNOWN]
+
+
+def objectives(incomplete: str) -> Values:
+    """Offer what `gfimu optimize` can make small."""
+    from gfimu.array_search.objectives import OBJECTIVES
+
+    return beginning(incomplete, OBJECTIVES)
+
+
+def shown(incomplete: str) -> Values:
+    """Offer all that `gfimu show` prints by name."""
+    kinds = ("arrays", "parts", "maps", "twins", "scenarios", "frames")
+    return [*(one for kind in kinds for one in _models(kind, incomplete)), *_catalogued(incomplete)]
+
+
+def _catalogued(incomplete: str) -> Values:
+    from gfimu.base.files.model_files import effect_catalogue
+
+    return beginning(incomplete, effect_catalogue())
+
+
+def _models(kind: str, incomplete: str) -> Values:
+    from gfimu.base.files.model_files import list_models
+
+    return beginning(incomplete, list_models(kind))
+
+
+def beginning(incomplete: str, names: Iterable[str]) -> Values:
+    """Offer those of some names that begin so."""
+    return [(name, "") for name in names if name.startswith(incomplete)]

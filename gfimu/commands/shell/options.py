@@ -1,0 +1,160 @@
+"""The options that several commands take: one name, one description and one way to complete each.
+
+What is special to a command goes behind the common description or before it (`Option.also`).
+"""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from gfimu.base.files.outputs import PICTURE as PICTURE_FILE
+from gfimu.base.files.outputs import RECORDING, RERUN
+from gfimu.commands.shell import completion
+from gfimu.commands.shell.declare import Group, Option
+
+if TYPE_CHECKING:
+    from gfimu.recording.importing import ColumnMap
+
+FOREIGN = "A file of another layout"
+
+ALLOW_CODE = Option("Let a file run the Python code that it names: only a file that you trust.")
+ARRAY = Option(
+    "Array: a name, an array file (.toml) or an MJCF file with sites (.xml)",
+    "ARRAY",
+    offers=completion.arrays,
+    kind=str,
+    reads=True,
+)
+BAUD = Option("Speed of the line, bits per second", "BAUD")
+BIAS_MG = Option("Bias of each channel, 1 σ, mg", "MG")
+BIAS_STD_M_S2 = Option("Standard deviation of each channel's bias, m/s²", "M/S²")
+BY = Option("Factor to group by; may be repeated. A range is cut into fifths.", "FACTOR", kind=list[str])
+CALIBRATION = Option("Calibration to apply first (.json, from gfimu calibrate).", "FILE", kind=Path, reads=True)
+CHIPS = Option("Number of chips", "N")
+DATA = Option("Folder of the measured data, for the set real.", "DIR", kind=Path, reads=True)
+DURATION = Option("Length of the run, s", "S")
+FORCE = Option("Go on where the checks of units, time, array and channels refuse the file")
+GRAVITY = Option("Local gravity, m/s²", "M/S²")
+GYRO = Option("Fuse the gyro columns as well")
+IMAGE = Option(
+    "Image: gfimu, selfcheck, or an ELF or .bin file.",
+    "IMAGE",
+    kind=str,
+    offers=completion.words("gfimu", "selfcheck"),
+    reads=True,
+)
+KEEP_FAULTY = Option("Use channels that contradict the others, too")
+LATITUDE = Option("Latitude, degrees", "DEG")
+LIMIT = Option("Only so many worlds of each set, which stand in random order.", "N", least=1)
+MAX_MEMORY = Option(
+    "Memory that reading a file may take, as 2GB; by default four times its size and 500 MB", "SIZE", kind=str
+)
+NOISE_UG = Option("White noise of each channel, one-sided density, µg/√Hz", "UG")
+PICTURE = Option("Picture to write (.png, .svg, .pdf)", "FILE", kind=Path, writes=PICTURE_FILE)
+PORT = Option("Port of the board", "PORT")
+PROGRESS = Option("Called with the share done, 0 to 1, and a line of text", shell=False)
+RANGE = Option("Range of the chips: ±2, 4, 8 or 16 g", "G")
+RATE = Option("Sample rate, Hz", "HZ")
+RECORDINGS = Option("Recordings of one rig: .csv, .parquet, .bin", "RUN...", kind=list[Path], argument=True, reads=True)
+RECORDING_OUT = Option("Recording to write (.csv, .parquet).", "FILE", kind=Path, writes=RECORDING, what="recording")
+REST_THRESHOLD = Option("Threshold of rest, reading unit squared; else from the data.", "UNIT²")
+RRD = Option("Rerun recording to write (.rrd)", "FILE", kind=Path, writes=RERUN)
+SCENARIO = Option(
+    "Scenario: a name, or a scenario file (.toml)", "SCENARIO", offers=completion.scenarios, kind=str, reads=True
+)
+SEED = Option("Seed of everything left to chance", "N", least=0)
+SETS = Option(
+    "Set of worlds; may be repeated. All that are drawn by default.",
+    "SET",
+    kind=list[str],
+    offers=completion.words("own", "independent", "unlisted", "dcmotor", "real"),
+)
+SPEED_RAD_S = Option("Angular rate, rad/s", "RAD/S")
+SPLIT = Option(
+    "Worlds to develop on (dev), or those of the published table (test).",
+    "SPLIT",
+    offers=completion.words("dev", "test"),
+)
+TABLE = Option("Table, topic or member of a file that holds several.", "NAME", panel=FOREIGN)
+TIME_LIMIT = Option("Real time to spend at most, s", "S")
+TWIN = Option(
+    "Twin, what the simulation assumes: a name, or a twin file (.toml).",
+    "TWIN",
+    offers=completion.twins,
+    kind=str,
+    reads=True,
+)
+UNKNOWN_START = Option("The body may turn already when the run begins")
+WORKERS = Option("Processes to work in; by default one per processor", "N")
+
+
+ARRAYS = Option(
+    "Names, array files (.toml) or MJCF files (.xml); all shipped ones.",
+    "[ARRAY]...", kind=list[str], argument=True, offers=completion.arrays, reads=True,
+)  # fmt: skip
+
+
+def _map_from_options(
+    column_map: Annotated[
+        str | None,
+        Option(
+            "Column map: a name, or a TOML file (gfimu inspect writes one).",
+            "MAP",
+            name="--map",
+            offers=completion.maps,
+            reads=True,
+        ),
+    ] = None,
+    map_set: Annotated[
+        list[str],
+        Option(
+            "Set a key of the column map, or with no --map all of it: time.column=t time.unit=ms unit=g "
+            "channels.a11=ax drop=corrupt,duplicates; may be repeated.",
+            "KEY=VALUE",
+        ),
+    ] = (),  # type: ignore[assignment]
+    table: Annotated[str | None, TABLE] = None,
+) -> "ColumnMap | None":
+    """Return the map that the options of the shell say; None without any."""
+    if column_map is None and not map_set:
+        return None
+    import msgspec
+
+    from gfimu.recording.importing import load_map
+
+    chosen = load_map(column_map, map_set)
+    return chosen if table is None else msgspec.structs.replace(chosen, table=table)
+
+
+MAP_OF_TABLE = Group(
+    _map_from_options,
+    "What the columns of a foreign file are: a map, its name or TOML file; `gfimu.load_map` changes keys of one.",
+    panel=FOREIGN,
+    reads=True,
+)
+"""The map with the table that is meant, of a file that holds several."""
+
+MAP = replace(MAP_OF_TABLE, without=("table",))
+"""The map."""
+
+
+def _reference_map_from_options(
+    reference_map: Annotated[
+        str | None,
+        Option("Column map of the file of references.", "MAP", offers=completion.maps, reads=True),
+    ] = None,
+    reference_map_set: Annotated[
+        list[str], Option("Set a key of the reference's column map; may be repeated.", "KEY=VALUE")
+    ] = (),  # type: ignore[assignment]
+) -> "ColumnMap | None":
+    """Return the map of the references that the options of the shell say; None without any."""
+    return _map_from_options(reference_map, reference_map_set)
+
+
+REFERENCE_MAP = Group(
+    _reference_map_from_options,
+    "What the columns of a foreign file of references are: a map, its name or TOML file.",
+    panel=FOREIGN,
+    reads=True,
+)
+"""The map of a file of references."""

@@ -1,7 +1,0 @@
-"""Two files of two clocks: the offset and rate error between them, and one recording of both."""
-
-from gfimu.joining.join import Joined, join_reference
-from gfimu.joining.own_clock import displaced_reference
-from gfimu.joining.reference_file import ReferenceSeries, open_reference
-
-__all__ = ["Joined", "ReferenceSeries", "displaced_reference", "join_reference", "open_reference"]

@@ -1,7 +1,0 @@
-"""A simulation of one's own as a world model: a function that predicts readings, and what it may have wrong."""
-
-from gfimu.own_rig.cause import Cause, Parameter, bias_cause, gain_cause
-from gfimu.own_rig.model_file import load_model
-from gfimu.own_rig.simulator import SimulatorModel
-
-__all__ = ["Cause", "Parameter", "SimulatorModel", "bias_cause", "gain_cause", "load_model"]

@@ -1,0 +1,241 @@
+"""A look at a file of unknown layout: its columns, what they seem to be, what is odd, and a map to start from."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gfimu.base.declared import Declared, figure
+from gfimu.base.errors import InputError, one_line
+from gfimu.base.files.table import ArrowStream
+from gfimu.base.results import TableResult, text_column
+from gfimu.base.units import REFERENCE_UNITS, TIME_COLUMNS, reference_quantity
+from gfimu.recording.importing.clock import Times, times_of
+from gfimu.recording.importing.column_map import ColumnMap, TextSpec, TimeSpec, map_toml
+from gfimu.recording.importing.guessing.likely_reference import likely_references
+from gfimu.recording.importing.guessing.suggestion import roles_by_map, suggest, with_shipped
+from gfimu.recording.importing.oddities import oddities
+from gfimu.recording.importing.raw_table import RawFile, RawTable
+from gfimu.recording.importing.readers import read_foreign
+from gfimu.recording.importing.readers.tables import table_file
+from gfimu.recording.importing.recognise import fitting_maps, own_chips
+
+__all__ = ["ColumnView", "Inspection", "inspect_file"]
+
+
+_MOST_COLUMNS, _MOST_TABLES = 600, 200  # of a file whose layout is guessed
+
+
+@dataclass(frozen=True)
+class ColumnView(Declared):
+    """A column as it looks."""
+
+    name: Annotated[str, figure("Its name in the file.", head="column")]
+    least: Annotated[float, figure("Least of its numbers; null: it has none.", head="least", form=".6g")]
+    most: Annotated[float, figure("Largest of its numbers.", head="most", form=".6g")]
+    median: Annotated[float, figure("Median of its numbers.", head="median", form=".6g")]
+    missing: Annotated[int, figure("Cells without a number.", head="missing")]
+    role: Annotated[str, figure("What it seems to be.", head="seems to be")] = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Inspection(Declared, TableResult):
+    """What a file seems to hold: the proposed meaning of its columns, with the evidence for it.
+
+    ``column_map`` is the map to start from, None if no accelerations were found; ``is_own`` whether it is a recording
+    of gfimu's, which needs no map.
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> gfimu.inspect("log.csv").fitting  # doctest: +SKIP
+    """
+
+    source: Annotated[str, figure("The file.")]
+    format: Annotated[str, figure("Its format.", head="format")]
+    table: Annotated[str, figure("The table that was looked at; empty for the file itself.")]
+    tables: Annotated[tuple[str, ...], figure("All tables of the file, with their rows.")]
+    rows: Annotated[int, figure("Rows of that table.", head="rows")]
+    sample_rate_hz: Annotated[float, figure("Sample rate by the times; null if unknown.", "Hz", head="sample rate")] = (
+        math.nan
+    )
+    chips: Annotated[int, figure("Triads of accelerations.", head="triads of accelerations")] = 0
+    columns: Annotated[tuple[ColumnView, ...], figure("The columns as they look.")]
+    fitting: Annotated[
+        tuple[str, ...],
+        figure("Column maps that come with gfimu and fit, the most plausible first.", key="fitting_maps", head="maps"),
+    ] = ()
+    findings: Annotated[tuple[str, ...], figure("What is odd: gaps, rails, corrupt values, noisy channels.")] = ()
+    reasons: Annotated[tuple[str, ...], figure("What the proposed map rests on, one line each.")] = ()
+    column_map: ColumnMap | None = None
+    is_own: bool = False
+
+    @property
+    def map_toml(
+        self,
+    ) -> Annotated[str, figure("A column map to start from (TOML); empty where none was found.")]:
+        """The suggested map as a TOML file with the reasons as comments."""
+        if self.column_map is None:
+            return ""
+        lines = (f"Suggested by gfimu inspect for {self.source}", *self.reasons)
+        return "".join(f"# {one_line(line)}\n" for line in lines) + map_toml(self.column_map)
+
+    @property
+    def summary(self) -> str:
+        """Format, rows, rate and chips in one line."""
+        rate = f", {self.sample_rate_hz:.5g} Hz" if math.isfinite(self.sample_rate_hz) else ""
+        chips = f"{self.chips} chip{'' if self.chips == 1 else 's'}" if self.chips else "no accelerations found"
+        return f"{self.source}: {self.format}, {self.rows} rows{rate}, {chips}"
+
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """Return one row per column of the file: range, median, missing values, and what it seems to be."""
+        numbers = {
+            key: np.array([getattr(one, key) for one in self.columns]) for key in ("least", "median", "most", "missing")
+        }
+        return {
+            "column": text_column(one.name for one in self.columns),
+            **numbers,
+            "role": text_column(one.role for one in self.columns),
+        }
+
+    def _heading(self) -> str:
+        return f"Inspection of {self.source}"
+
+    def _notes(self) -> tuple[str, ...]:
+        return self.findings
+
+
+def inspect_file(path: str | Path | ArrowStream, *, table: str = "", text: TextSpec = TextSpec()) -> Inspection:
+    """Look at a file of unknown layout.
+
+    Parameters
+    ----------
+    path : str, Path or table
+        The file, of any format that has a reader, or a table of pandas, polars or pyarrow.
+    table : str
+        Table of the file to look at; by default the one with the most triads of accelerations.
+    text : TextSpec
+        Layout of a text file, where it is known.
+
+    Raises
+    ------
+    InputError
+        If the file can't be read at all, or it is neither a path nor a table.
+    """
+    raw = read_foreign(path, text=text) if isinstance(path, str | Path) else table_file(path)
+    widest = max(raw.tables.values(), key=lambda one: len(one.columns))
+    if len(widest.columns) > _MOST_COLUMNS or len(raw.tables) > _MOST_TABLES:
+        what = f"{len(widest.columns)} columns" if len(widest.columns) > _MOST_COLUMNS else f"{len(raw.tables)} tables"
+        raise InputError(
+            f"{raw.source}: has {what}, too many to guess what they are; name those of the recording in a map"
+        )
+    plain = raw.table(table) if table else next(iter(raw.tables.values()))
+    own = own_chips(list(plain.columns))
+    if own:
+        return _own_recording(raw, plain, own)
+    found = suggest(raw, table=table, name=_map_name(raw.source), text=text)
+    fitting = tuple(fitting_maps(raw))
+    suggested, reasons = found.column_map, found.reasons
+    time, is_rate_known, roles = found.time.spec, found.time.is_rate_known, found.roles
+    if suggested is not None and len(fitting) == 1 and fitting_maps(raw, fully=True):
+        suggested, differences = with_shipped(found, suggested, fitting[0])
+        reasons = (f"the map {fitting[0]} that comes with gfimu fits: columns, rate, gravity at rest", *differences)
+        time, is_rate_known = suggested.time, True
+        roles = roles_by_map(suggested, found.table)
+    times, findings = _times(found.table, time, raw.source)
+    findings += [note.removeprefix(f"{raw.source}: ") for note in found.table.notes]
+    findings += oddities({name: one.numbers(name) for one, triad in found.chips for name in triad.columns})
+    return Inspection(
+        source=raw.source,
+        format=raw.format,
+        table=found.table.name,
+        tables=tuple(f"{name or 'the file'} ({len(one)} rows)" for name, one in found.raw.tables.items()),
+        rows=len(found.table),
+        sample_rate_hz=_rate(times) if is_rate_known else math.nan,
+        chips=len(found.chips),
+        columns=tuple(_view(found.table, name, roles.get(name, "")) for name in found.table.columns),
+        fitting=fitting,
+        findings=tuple(findings),
+        reasons=reasons,
+        column_map=suggested,
+    )
+
+
+def _own_recording(raw: RawFile, table: RawTable, chips: dict[str, list[str]]) -> Inspection:
+    """Return what a recording in gfimu's own columns holds; it needs no map."""
+    channels = [name for names in chips.values() for name in names]
+    roles = {name: f"{name.partition('_')[0]}, {name.partition('_')[2]}" for name in channels} | {"t_s": "time"}
+    roles |= {name: "reference" for name in table.columns if _is_reference(name) and name != "t_s"}
+    have = {reference_quantity(name) for name, role in roles.items() if role == "reference"}
+    further = {name: values for name, values in table.columns.items() if name not in roles}
+    likely = [one for one in likely_references(further) if reference_quantity(one.reference) not in have]
+    roles |= {one.column: f"{reference_quantity(one.reference)}? {one.unit}" for one in likely}
+    times, findings = _times(table, TimeSpec("t_s"), raw.source, drop=("duplicates", "unordered"))
+    findings += [f"{one.reference} is not there; {one.remedy}" for one in likely]
+    if times is not None and times.dropped:
+        findings.append("with such rows it is refused; gfimu convert --drop duplicates,unordered leaves them out")
+    findings += oddities({name: table.numbers(name) for name in channels})
+    return Inspection(
+        source=raw.source,
+        format=raw.format,
+        table=table.name,
+        tables=(f"{table.name or 'the file'} ({len(table)} rows)",),
+        rows=len(table),
+        sample_rate_hz=_rate(times),
+        chips=len(chips),
+        columns=tuple(_view(table, name, roles.get(name, "")) for name in table.columns),
+        findings=tuple(findings),
+        reasons=("its columns carry their units: a recording of gfimu's, which needs no column map",),
+        is_own=True,
+    )
+
+
+def _is_reference(name: str) -> bool:
+    return name in TIME_COLUMNS.values() or any(
+        name == f"{quantity}_{unit}" for quantity, units in REFERENCE_UNITS.items() for unit in units
+    )
+
+
+def _rate(times: Times | None) -> float:
+    return 1.0 / float(np.median(np.diff(times.t_s))) if times is not None and len(times.t_s) > 1 else float("nan")
+
+
+def _map_name(source: str) -> str:
+    return Path(source).name.partition(".")[0] or "map"
+
+
+def _view(table: RawTable, name: str, role: str) -> ColumnView:
+    values = table.numbers(name) if table.columns[name].dtype.kind != "M" else np.full(len(table), np.nan)
+    known = values[np.isfinite(values)]
+    if not len(known):
+        return ColumnView(name, np.nan, np.nan, np.nan, len(values), role or "text")
+    missing = int(len(values) - len(known))
+    return ColumnView(name, float(known.min()), float(known.max()), float(np.median(known)), missing, role)
+
+
+def _times(table: RawTable, spec: TimeSpec, source: str, *, drop: Sequence[str] = ()) -> tuple[Times | None, list[str]]:
+    """Return the times of a table, and what is odd about them."""
+    try:
+        times = times_of(table, spec, source, drop=drop)
+    except InputError as error:
+        return None, [str(error).removeprefix(f"{source}: ")]
+    found = [note.removeprefix(f"{source}: ") for note in times.notes]
+    if spec.column is None or len(times.t_s) < 3:
+        return times, found
+    steps = np.diff(times.t_s)
+    usual = float(np.median(steps))
+    gaps = steps > 1.5 * usual
+    if gaps.any():
+        lost = float(np.sum(steps[gaps] - usual))
+        place = times.t_s[int(np.argmax(gaps))] - times.t_s[0]
+        found.append(f"{int(gaps.sum())} gaps, {lost:.3g} s in all, the first {place:.4g} s after the start")
+    jitter = float(np.std(steps[~gaps]) / usual)
+    if jitter > 0.02:
+        found.append(f"the sample period scatters by {100 * jitter:.2g}% of itself")
+    return times, found

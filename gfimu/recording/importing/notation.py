@@ -1,0 +1,168 @@
+"""Units as other programs write them, and their factors to SI."""
+
+from __future__ import annotations
+
+import math
+import re
+
+from gfimu.base.errors import UnitError
+from gfimu.base.units import STANDARD_GRAVITY
+
+__all__ = [
+    "ACCELERATION",
+    "ANGLE",
+    "RATE",
+    "TEMPERATURE",
+    "TIME",
+    "bracketed_unit",
+    "factor_of",
+    "kind_of",
+    "unit_of_name",
+]
+
+_DEGREE = math.pi / 180.0
+
+ACCELERATION = {
+    "m/s2": 1.0,
+    "mm/s2": 1e-3,
+    "cm/s2": 1e-2,
+    "g": STANDARD_GRAVITY,
+    "mg": STANDARD_GRAVITY / 1e3,
+    "ug": STANDARD_GRAVITY / 1e6,
+    "ft/s2": 0.3048,
+}
+RATE = {"rad/s": 1.0, "mrad/s": 1e-3, "deg/s": _DEGREE, "mdeg/s": 1e-3 * _DEGREE, "rpm": math.pi / 30.0, "hz": math.tau}
+ANGLE = {"rad": 1.0, "mrad": 1e-3, "deg": _DEGREE, "rev": math.tau}
+TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "d": 86400.0}
+TEMPERATURE = {"degc": 1.0}
+LENGTH = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
+SPEED = {"m/s": 1.0, "mm/s": 1e-3, "mm/min": 1e-3 / 60.0}
+
+_KINDS = {
+    "acceleration": ACCELERATION,
+    "rate": RATE,
+    "angle": ANGLE,
+    "time": TIME,
+    "temperature": TEMPERATURE,
+    "length": LENGTH,
+    "speed": SPEED,
+}
+_SAME = {
+    "m/s/s": "m/s2",
+    "ms-2": "m/s2",
+    "m/sec2": "m/s2",
+    "m_s2": "m/s2",
+    "mm_s2": "mm/s2",
+    "gn": "g",
+    "gs": "g",
+    "milli-g": "mg",
+    "rads-1": "rad/s",
+    "rad_s": "rad/s",
+    "radians/s": "rad/s",
+    "rad/sec": "rad/s",
+    "degs-1": "deg/s",
+    "deg/sec": "deg/s",
+    "deg_s": "deg/s",
+    "dps": "deg/s",
+    "mdps": "mdeg/s",
+    "rads": "rad/s",
+    "rads/s": "rad/s",
+    "rps": "hz",
+    "rev/s": "hz",
+    "ms2": "m/s2",
+    "mps2": "m/s2",
+    "cm_s2": "cm/s2",
+    "gal": "cm/s2",
+    "days": "d",
+    "day": "d",
+    "millis": "ms",
+    "micros": "us",
+    "min-1": "rpm",
+    "u/min": "rpm",
+    "r/min": "rpm",
+    "1/min": "rpm",
+    "degrees": "deg",
+    "degree": "deg",
+    "radians": "rad",
+    "turns": "rev",
+    "turn": "rev",
+    "sec": "s",
+    "second": "s",
+    "seconds": "s",
+    "msec": "ms",
+    "milliseconds": "ms",
+    "usec": "us",
+    "microseconds": "us",
+    "nsec": "ns",
+    "nanoseconds": "ns",
+    "c": "degc",
+    "celsius": "degc",
+}
+_ENDS = re.compile(r"^(.*?[A-Za-z0-9\]])[_ ,.]+(m_s2|mm_s2|cm_s2|rad_s|deg_s|[A-Za-zµ°/²^]+[0-9]?)$")
+_WORDS = {"g", "s", "h", "d", "c", "min", "gs", "day", "hz", "rev", "turn", "turns", "second", "gal"}
+_BRACKETS = re.compile(r"[\[({]((?:[^\[\](){}]|\([^\[\](){}]*\))+)[\])}]$")
+
+
+def _plain(text: str) -> str:
+    """Return a unit without the marks that people set differently."""
+    short = (
+        text.strip().lower().replace("²", "2").replace("µ", "u").replace("μ", "u").replace("⁻¹", "-1").replace("⁻", "-")
+    )
+    short = short.replace("°c", "degc").replace("°", "deg").replace("^", "").replace("*", "").replace("·", "")
+    short = re.sub(r"[\s()]", "", short)
+    return _SAME.get(short, short)
+
+
+def factor_of(unit: str, kind: str, *, where: str = "") -> float:
+    """Return the factor of a unit to SI.
+
+    Parameters
+    ----------
+    unit : str
+        As people write it: ``m/s^2``, ``m_s2``, ``°/s``, ``dps``, ``rad s^-1``.
+    kind : {"acceleration", "rate", "angle", "time", "temperature", "length", "speed"}
+        What is measured.
+    where : str
+        What has that unit, for messages.
+
+    Raises
+    ------
+    UnitError
+        If the unit is none of that kind.
+    """
+    factors = _KINDS[kind]
+    try:
+        return factors[_plain(unit)]
+    except KeyError:
+        place = f"{where}: " if where else ""
+        raise UnitError(f"{place}unknown unit {unit!r} for {kind}; valid: {', '.join(factors)}") from None
+
+
+def kind_of(unit: str) -> str:
+    """Return what is measured in a unit; empty if it is not known."""
+    plain = _plain(unit)
+    return next((kind for kind, factors in _KINDS.items() if plain in factors), "")
+
+
+def bracketed_unit(name: str) -> tuple[str, str]:
+    """Split the name of a column into the name and a unit in brackets at its end; empty without one."""
+    plain = name.strip()
+    found = _BRACKETS.search(plain)
+    if found is None or not kind_of(found[1]):
+        return plain, ""
+    return plain[: found.start()].strip(), found[1].strip()
+
+
+def unit_of_name(name: str) -> tuple[str, str]:
+    """Split the name of a column into the name and its unit, in brackets or as its last word; empty without one.
+
+    ``acc_x_mg``, ``omega_dps`` and ``time_ms`` carry a unit; a last word that may mean anything else, as the s of
+    ``acc_s``, counts only in brackets.
+    """
+    plain, unit = bracketed_unit(name)
+    if unit:
+        return plain, unit
+    found = _ENDS.match(name.strip())
+    if found is None or found[2].lower() in _WORDS or not kind_of(found[2]):
+        return plain, ""
+    return found[1], found[2]

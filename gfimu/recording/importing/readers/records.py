@@ -1,0 +1,224 @@
+"""Files of records: JSON, one record per line or all in one, and the sheets of an Excel workbook."""
+
+from __future__ import annotations
+
+import datetime as dt
+import sys
+import zipfile
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from gfimu.base.errors import InputError
+from gfimu.base.files.input_file import parsing, read_bytes
+from gfimu.base.files.memory import MemoryLimit, MemoryLimitError
+from gfimu.base.optional_packages import require
+from gfimu.recording.importing.column_map import TextSpec
+from gfimu.recording.importing.raw_table import RawFile, RawTable
+from gfimu.recording.importing.readers.text import GROWS, cell_values, table_of_text
+
+__all__ = ["is_workbook", "read_excel", "read_json"]
+
+_LEAST_ROWS = 3
+_MOST_CELLS = 64  # of a list in a record: what has more is no sample
+_GROWS: Mapping[bytes, int] = {b"{": 280, b"[": 100, b",": 48, b":": 62}
+"""Numerical: memory for an object, a list, a value and a key of JSON while they become columns, bytes, measured."""
+_TIMES_SHEET = 5.0  # numerical: memory for a byte of a workbook's XML, unpacked, measured
+_ROW = 60  # numerical: bytes of an empty row, of which a file of two rows may state millions
+
+
+def read_json(path: Path, text: TextSpec = TextSpec()) -> RawFile:
+    """Read JSON: records one per line, a list of records, or lists of numbers by name."""
+    data = read_bytes(path).removeprefix(b"\xef\xbb\xbf").strip()
+    MemoryLimit.of(path).needs(len(data) + sum(size * data.count(mark) for mark, size in _GROWS.items()))
+    lost = 0
+    try:
+        content = msgspec.json.decode(data)
+    except RecursionError:
+        raise InputError(f"{path}: JSON nested too deeply; write a record per sample") from None
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        content, lost = _lines(data)
+        if len(content) < _LEAST_ROWS:
+            raise InputError(f"{path}: damaged JSON file ({str(error)[:120]}); write it again") from None
+    tables = {name: table for name, table in _tables(content, "") if len(table) >= _LEAST_ROWS}
+    if not tables:
+        raise InputError(f"{path}: JSON without a list of readings; write a record per sample, or a list per column")
+    note = (f"{path}: left out {lost} lines that are no JSON",) if lost else ()
+    return RawFile(
+        str(path), "json", {name: RawTable(name, one.columns, (*note, *one.notes)) for name, one in tables.items()}
+    )
+
+
+def _lines(data: bytes) -> tuple[list[Any], int]:
+    """Return the records of lines, and how many lines are none, as the last one of a file that was cut off."""
+    found, lost = [], 0
+    for line in data.splitlines():
+        if line.strip():
+            try:
+                found.append(msgspec.json.decode(line.strip().rstrip(b",")))
+            except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
+                lost += 1
+    return found, lost
+
+
+def _tables(content: Any, name: str) -> Iterator[tuple[str, RawTable]]:
+    """Yield the tables that JSON holds: lists of records, objects of lists or of records by row, deeper ones too."""
+    if isinstance(content, list) and content:
+        if all(isinstance(one, Mapping) for one in content[:_LEAST_ROWS]):
+            yield from _of_records(content, name)
+        elif _is_matrix(content):
+            yield name, _table(name, dict(_side_by_side({"row": content})), [])
+        elif all(isinstance(one, list) for one in content[:_LEAST_ROWS]):
+            yield from _of_records([{"row": one} for one in content], name)
+    elif isinstance(content, Mapping):
+        lists = {key: one for key, one in content.items() if isinstance(one, list) and len(one) >= _LEAST_ROWS}
+        plain = {key: one for key, one in lists.items() if not isinstance(one[0], Mapping)}
+        lengths = {len(one) for one in plain.values()}
+        by_row = all(isinstance(one, Mapping) and "0" in one for one in content.values())
+        if by_row:
+            yield from _tables({key: list(one.values()) for key, one in content.items()}, name)
+            return
+        if len(plain) >= 2 and len(lengths) == 1:
+            yield name, _table(name, dict(_side_by_side(plain)), [])
+        for key, one in content.items():
+            if key not in plain or len(lengths) != 1:
+                yield from _tables(one, f"{name}.{key}".lstrip("."))
+
+
+def _is_matrix(content: list[Any]) -> bool:
+    """Whether a list holds rows of the same number of cells."""
+    if not all(isinstance(row, list) for row in content):
+        return False
+    widths = {len(row) for row in content}
+    return (
+        len(widths) == 1
+        and 0 < min(widths) <= _MOST_CELLS
+        and not any(isinstance(one, list | Mapping) for one in content[0])
+    )
+
+
+def _side_by_side(lists: Mapping[str, list[Any]]) -> Iterator[tuple[str, list[Any]]]:
+    """Yield lists of numbers as columns, and of lists of numbers their places: ``acc[0]``."""
+    for key, one in lists.items():
+        widths = {len(row) for row in one if isinstance(row, list)}
+        if len(widths) == 1 and all(isinstance(row, list) for row in one):
+            yield from ((f"{key}[{place}]", [row[place] for row in one]) for place in range(min(widths)))
+        else:
+            yield key, one
+
+
+def _of_records(records: list[Any], name: str) -> Iterator[tuple[str, RawTable]]:
+    """Yield the table of a list of records; one per set of keys where they differ, as of messages of several kinds."""
+    kinds: dict[tuple[str, ...], list[dict[str, Any]]] = {}
+    for one in records:
+        if isinstance(one, Mapping):
+            flat = dict(_flat(one, ""))
+            kinds.setdefault(tuple(sorted(flat)), []).append(flat)
+    large = [rows for rows in kinds.values() if len(rows) >= 0.1 * max(map(len, kinds.values()), default=0)]
+    apart = len(large) > 1 and all(
+        len(set(one[0]) & set(two[0])) < 0.7 * max(len(one[0]), len(two[0]))
+        for place, one in enumerate(large)
+        for two in large[place + 1 :]
+    )
+    if not apart:
+        large = [[row for rows in kinds.values() for row in rows]] if len(kinds) == 1 else [_in_order(records)]
+    for rows in large:
+        keys = list(dict.fromkeys(key for row in rows for key in row))
+        own = [key for key in keys if not apart or all(key not in other[0] for other in large if other is not rows)]
+        label = f"{name} {own[0].partition('.')[0]}".strip() if apart and own else name
+        yield label, _table(label, {key: [row.get(key) for row in rows] for key in keys}, [])
+
+
+def _in_order(records: list[Any]) -> list[dict[str, Any]]:
+    return [dict(_flat(one, "")) for one in records if isinstance(one, Mapping)]
+
+
+def _flat(record: Mapping[str, Any], before: str) -> Iterator[tuple[str, Any]]:
+    """Yield the cells of a record with the names of what they are in: ``acc.x``, ``gyro[0]``."""
+    for key, value in record.items():
+        name = sys.intern(f"{before}{key}")  # once for all records
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{name}.")
+        elif isinstance(value, list) and len(value) <= _MOST_CELLS:
+            for place, one in enumerate(value):
+                if isinstance(one, Mapping):
+                    yield from _flat(one, f"{name}[{place}].")
+                else:
+                    yield f"{name}[{place}]", one
+        elif not isinstance(value, list):
+            yield name, value
+
+
+def _table(name: str, columns: Mapping[str, list[Any]], notes: list[str]) -> RawTable:
+    found: dict[str, NDArray[Any]] = {}
+    for key, cells in columns.items():
+        whole = all(type(one) is int and abs(one) < 2**63 for one in cells)
+        numbers = [one for one in cells if isinstance(one, int | float) and not isinstance(one, bool)]
+        if whole:
+            found[key] = np.array(cells, dtype=np.int64)
+        elif numbers and len(numbers) + sum(one is None for one in cells) == len(cells):
+            found[key] = np.array([np.nan if one is None else float(one) for one in cells])
+        else:
+            texts = pa.array(["" if one is None else str(one) for one in cells], pa.string())
+            values, unreadable = cell_values(texts, ".")
+            if values is not None:
+                found[key] = values
+            if unreadable:
+                notes.append(f"column {key}: {unreadable} cells are no numbers and count as missing")
+    return RawTable(name, found, tuple(notes))
+
+
+def is_workbook(path: Path) -> bool:
+    """Whether a zip archive is an Excel workbook."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return any(name.startswith("xl/") for name in archive.namelist())
+    except (zipfile.BadZipFile, OSError, ValueError, RuntimeError):  # also of a version that is not implemented
+        return False
+
+
+def read_excel(path: Path, text: TextSpec = TextSpec()) -> RawFile:
+    """Read the sheets of an Excel workbook (xlsx), each as a table."""
+    require(f"{path}: an Excel workbook", "openpyxl", instead="save the sheet as CSV")
+    import openpyxl
+
+    limit = MemoryLimit.of(path)
+    tables: dict[str, RawTable] = {}
+    with parsing(path, "workbook", "save the sheet as CSV"):
+        with zipfile.ZipFile(path) as archive:
+            limit.needs(_TIMES_SHEET * sum(one.file_size for one in archive.infolist()))
+        book = openpyxl.load_workbook(path, read_only=True, data_only=True, keep_links=False)
+        for sheet in book.worksheets:
+            sheet.reset_dimensions()  # a file may state a million columns; rows are as long as they are
+            lines, size = [], 0
+            for row in sheet.iter_rows(values_only=True):
+                lines.append("\t".join(_cell(one) for one in row))
+                size += len(lines[-1]) + _ROW
+                limit.needs(GROWS * size, at_least=True)
+            try:
+                table = table_of_text("\n".join(lines).encode(), f"{path}/{sheet.title}", _tabs(text), limit)
+            except MemoryLimitError:
+                raise
+            except InputError:
+                continue  # a sheet of remarks or a chart
+            tables[sheet.title] = RawTable(sheet.title, table.columns, table.notes, table.named, table.preamble)
+    if not tables:
+        raise InputError(f"{path}: no sheet with numbers in columns; save the recording as CSV")
+    return RawFile(str(path), "excel", tables)
+
+
+def _tabs(text: TextSpec) -> TextSpec:
+    return msgspec.structs.replace(text, separator="tab", decimal=".")
+
+
+def _cell(value: Any) -> str:
+    if value is None:
+        return ""
+    if isinstance(value, dt.datetime):
+        return value.isoformat(sep=" ")
+    return str(value).replace("\t", " ").replace("\n", " ")

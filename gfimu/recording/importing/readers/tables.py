@@ -1,0 +1,86 @@
+"""Files that hold tables by themselves: Parquet, and an archive of text files."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from gfimu.base.errors import InputError
+from gfimu.base.files.column_file import open_parquet
+from gfimu.base.files.input_file import parsing
+from gfimu.base.files.memory import MemoryLimit, MemoryLimitError
+from gfimu.base.files.table import as_found
+from gfimu.base.files.table_columns import TableColumns
+from gfimu.recording.importing.column_map import TextSpec
+from gfimu.recording.importing.raw_table import RawFile, RawTable
+from gfimu.recording.importing.readers.text import GROWS, table_of_text
+
+__all__ = ["read_archive", "read_parquet", "table_file"]
+
+
+def read_parquet(path: Path, text: TextSpec = TextSpec()) -> RawFile:
+    """Read a Parquet file."""
+    with parsing(path, "Parquet file", "write it again", enforced=False):
+        file = open_parquet(path)
+        names = (
+            file.schema_arrow.names
+        )  # one column after the other: in Arrow's form and NumPy's, all take twice as much
+        return RawFile(str(path), "parquet", {"": _arrow_table((one, file.read([one]).column(one)) for one in names)})
+
+
+def _arrow_table(found: Iterable[tuple[str, pa.ChunkedArray]]) -> RawTable:
+    """Return Arrow columns as NumPy's."""
+    columns: dict[str, NDArray[Any]] = {}
+    for name, column in found:
+        kind = column.type
+        if pa.types.is_timestamp(kind):
+            columns[name] = column.cast(pa.timestamp("ns")).to_numpy().astype("datetime64[ns]")
+        elif pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_decimal(kind):
+            columns[name] = as_found(column if not pa.types.is_decimal(kind) else column.cast(pa.float64()))
+        elif pa.types.is_dictionary(kind):
+            columns[name] = as_found(column)
+        else:
+            columns[name] = np.array(column.to_pylist(), dtype=object)
+    return RawTable("", columns)
+
+
+def table_file(source: Any) -> RawFile:
+    """Return a table object of pandas, polars or pyarrow as a file of one table.
+
+    Raises
+    ------
+    InputError
+        If it is no such table, has a column without a name, or repeats one.
+    """
+    name = TableColumns(source).file
+    table = pa.Table.from_pandas(source) if hasattr(source, "reset_index") else pa.table(source)
+    return RawFile(name, "table", {"": _arrow_table(zip(table.column_names, table.columns, strict=True))})
+
+
+def read_archive(path: Path, text: TextSpec = TextSpec()) -> RawFile:
+    """Read the text files of a zip archive, each as a table."""
+    limit = MemoryLimit.of(path)
+    with parsing(path, "archive", "copy it again", enforced=False), zipfile.ZipFile(path) as archive:
+        members = [one for one in archive.infolist() if Path(one.filename).suffix.lower() in {".csv", ".txt", ".tsv"}]
+        limit.needs(GROWS * sum(one.file_size for one in members))
+        tables = {one.filename: _member(archive.read(one), path, one.filename, text, limit) for one in members}
+    found = {name: table for name, table in tables.items() if table is not None}
+    if not found:
+        raise InputError(f"{path}: no text file with numbers in the archive; unpack it and give the recording")
+    return RawFile(str(path), "zip", found)
+
+
+def _member(data: bytes, path: Path, name: str, text: TextSpec, limit: MemoryLimit) -> RawTable | None:
+    try:
+        return replace(table_of_text(data, f"{path}/{name}", text, limit), name=name)
+    except MemoryLimitError:
+        raise
+    except InputError:
+        return None  # a description, not a table

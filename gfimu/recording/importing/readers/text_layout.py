@@ -1,0 +1,177 @@
+"""The layout of a text file of numbers: separator, decimal mark, names of the columns, first line of numbers."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from gfimu.recording.importing.notation import kind_of, unit_of_name
+
+__all__ = ["COMMENT_MARKS", "Layout", "cells_of", "layout_of"]
+
+COMMENT_MARKS = "#;%/*"
+_LONGEST_CELL = 100  # characters of a number or time
+_LOOKED_AT = 400  # lines
+_QUOTED_AT = 20  # of these, at the end, that show whether numbers stand in quotes
+_SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " "}
+_NUMBER = {
+    ".": re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE),
+    ",": re.compile(
+        r"[+-]?(\d{1,3}(\.\d{3})+,\d+|\d+,?\d*|,\d+)([eE][+-]?\d+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE
+    ),
+}
+_STAMP = re.compile(r"(\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4})?[T _]*(\d{1,2}:\d\d(:\d\d([.,:]\d+)?)?)?\s*([AaPp][Mm]|Z)?")
+_LEAST_NUMBERS = 0.5  # of the cells of a line of data
+_NO_UNITS = {"", "-", "1", "raw", "cal", "counts", "lsb", "%", "mv", "v", "ut", "gauss", "hpa", "pa", "local_flux"}
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How a text file is laid out.
+
+    Parameters
+    ----------
+    separator : str
+        One character; a space stands for any number of spaces and tabs.
+    decimal : str
+        ``.`` or ``,``.
+    first : int
+        Number of lines before the first line of numbers.
+    names : tuple of str
+        Names of the columns, one per cell of a line.
+    named : bool
+        Whether the file has these names itself.
+    """
+
+    separator: str
+    decimal: str
+    first: int
+    names: tuple[str, ...]
+    named: bool
+
+
+def layout_of(
+    lines: Sequence[str], *, separator: str = "", decimal: str = "", skip: int | None = None, names: Sequence[str] = ()
+) -> Layout | None:
+    """Find the layout of a text file from its first lines; None if no line holds numbers.
+
+    Parameters
+    ----------
+    lines : sequence of str
+        First lines of the file.
+    separator, decimal : str
+        Known ones; found from the lines if empty.
+    skip : int, optional
+        Known number of lines before the first line of numbers.
+    names : sequence of str
+        Known names of the columns.
+    """
+    looked = list(lines[:_LOOKED_AT])
+    quoted = any('"' in line for line in looked[-_QUOTED_AT:])
+    best: tuple[tuple[int, float, int], Layout] | None = None
+    for mark in [_SEPARATORS.get(separator, separator)] if separator else _SEPARATORS.values():
+        for point in [decimal] if decimal else [".", ","]:
+            if point == mark and not quoted:
+                continue
+            data = _data_lines(looked, mark, point, skip or 0)
+            if not data:
+                continue
+            counted = [(number, len(cells)) for number, cells in data]
+            (width, lines_so), *_ = Counter(count for _, count in counted).most_common(1)
+            first = next(number for number, count in counted if count == width) if skip is None else skip
+            header = _header(looked[:first], mark, width) if not names else None
+            numbered = tuple(f"column_{place}" for place in range(1, width + 1))
+            # Names may end before the cells do, as where a separator closes each line.
+            known = tuple(names) + numbered[len(names) :] if names else header or numbered
+            score = (lines_so, _share_read([cells for _, cells in data if len(cells) == width], point), width)
+            # A point is the usual decimal mark: a comma has to read more lines, or more cells of them.
+            if best is None or score > best[0]:
+                best = score, Layout(mark, point, first, known, bool(names) or header is not None)
+    return None if best is None else best[1]
+
+
+def cells_of(line: str, separator: str) -> list[str]:
+    """Split a line; a space stands for any number of spaces and tabs, and a last ``;`` closes the line."""
+    if separator == " ":
+        return line.split()
+    closed = line.rstrip(" \r\n")
+    if separator != ";":
+        closed = closed.rstrip(";")
+    if '"' in closed:  # a cell in quotes may hold the separator
+        try:
+            return [cell.strip() for cell in next(csv.reader([closed], delimiter=separator, skipinitialspace=True), [])]
+        except csv.Error:  # a cell longer than any, or a return in it
+            pass
+    return [cell.strip() for cell in closed.split(separator)]
+
+
+def _data_lines(lines: Sequence[str], separator: str, decimal: str, skip: int) -> list[tuple[int, list[str]]]:
+    """Return the lines that hold numbers, with their places."""
+    number = _NUMBER[decimal]
+    found = []
+    for place, line in enumerate(lines):
+        if place < skip or not line.strip() or line.lstrip()[0] in COMMENT_MARKS:
+            continue
+        cells = cells_of(line, separator)
+        filled = [cell for cell in cells if cell]
+        numeric = sum(len(cell) <= _LONGEST_CELL and number.fullmatch(cell) is not None for cell in filled)
+        if numeric and numeric >= _LEAST_NUMBERS * len(filled):
+            found.append((place, cells))
+    return found
+
+
+def _share_read(lines: Sequence[Sequence[str]], decimal: str) -> float:
+    """Return which share of the filled cells are numbers, dates or times of day, to a hundredth."""
+    filled = [cell for cells in lines for cell in cells if cell]
+    short = [cell for cell in filled if len(cell) <= _LONGEST_CELL]
+    read = sum(_NUMBER[decimal].fullmatch(cell) is not None or _STAMP.fullmatch(cell) is not None for cell in short)
+    return round(read / max(len(filled), 1), 2)
+
+
+def _header(before: Sequence[str], separator: str, width: int) -> tuple[str, ...] | None:
+    """Return the names in the last line before the numbers, if it has one for each cell; with a line of units below."""
+    units: list[str] = []
+    for line in reversed(before):
+        if not line.strip():
+            continue
+        cells = _named_cells(line, separator, width)
+        if cells is None:
+            break
+        if not units and _are_units(cells):
+            units = cells
+            continue
+        return _names(cells, units)
+    return _names(units, []) if units else None
+
+
+def _named_cells(line: str, separator: str, width: int) -> list[str] | None:
+    """Return the cells of a line of names, one for each cell of a line of numbers; None where the numbers differ."""
+    cells = cells_of(line.lstrip().lstrip(COMMENT_MARKS).lstrip(), separator)
+    if len(cells) == width + 1:  # the line says what it is: ";Headers, time, Ax"; or it ends in a separator
+        cells = cells[1:] if cells[-1] else cells[:-1]
+    if len(cells) < width - 1 or len(cells) > width:
+        return None
+    return cells + [""] * (width - len(cells))
+
+
+def _are_units(cells: Sequence[str]) -> bool:
+    """Whether cells hold units: ``ms``, ``[mg]``, ``deg/s``; all that are filled, and not numbers of axes."""
+    plain = [cell.strip(" []()*").lower() for cell in cells]
+    known = [bool(kind_of(cell)) for cell in plain]
+    return sum(known) >= 2 and all(one or cell in _NO_UNITS for one, cell in zip(known, plain, strict=True))
+
+
+def _names(cells: Sequence[str], units: Sequence[str]) -> tuple[str, ...]:
+    """Return names of the columns, each only once, with their units in brackets where a line of them stands below."""
+    names = [cell or f"column_{place}" for place, cell in enumerate(cells, start=1)]
+    if units:
+        below = [unit.strip(" []()*") for unit in units]
+        names = [
+            f"{name} [{unit}]" if kind_of(unit) and not unit_of_name(name)[1] else name
+            for name, unit in zip(names, below, strict=True)
+        ]
+    repeated = Counter(names)
+    return tuple(f"{name}_{place}" if repeated[name] > 1 else name for place, name in enumerate(names, start=1))

@@ -1,0 +1,66 @@
+"""A reference that stands in a recording at times of another clock: seconds before or after its channels."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.linalg import null_space
+
+from gfimu.recording import Recording
+from gfimu.recording.joining.alignment import align
+from gfimu.recording.joining.join import FAR, Joined, grids, join_reference
+from gfimu.recording.joining.reference_file import ReferenceSeries
+
+__all__ = ["displaced_reference"]
+
+_COLUMNS = ("tacho_rad_s", "angle_rad", "command_rad_s")
+_FEWEST = 20  # values of a reference
+
+
+def displaced_reference(recording: Recording, *, rates: bool = False) -> Joined | None:
+    """Return the recording with its reference moved, where that is more than `FAR` from its channels.
+
+    Parameters
+    ----------
+    recording : Recording
+        Channels, m/s², with a tachometer, an angle or a command.
+    rates : bool
+        Whether a rate error alone is reason enough, as for a free body, whose model has none.
+
+    Returns
+    -------
+    Joined or None
+        None where the reference is near its channels, or nothing shows where it belongs.
+    """
+    columns = {name: recording.reference[name] for name in _COLUMNS if name in recording.reference}
+    known = np.isfinite(list(columns.values())).any(axis=0) if columns else np.zeros(len(recording), dtype=bool)
+    usable = np.isfinite(recording.readings).any(axis=0)
+    if known.sum() < _FEWEST or not usable.any() or recording.unit != "m_s2":
+        return None
+    series = ReferenceSeries("the reference", recording.t_s[known], {name: one[known] for name, one in columns.items()})
+    rate = series.rate()[1]
+    if len(rate) < _FEWEST or np.ptp(rate) == 0.0:
+        return None
+    seen = _without_hub(recording) if rates else recording
+    rough = align(grids(seen, series), most_rate_error=0.0, refine=False)
+    if rough is None or (abs(rough.offset) <= FAR and not rates):
+        return None
+    found = join_reference(recording, series, force=True, seen=seen if rates else None)
+    is_far = found.is_far or (rates and found.has_rate_error)
+    return found if is_far and not found.doubts else None
+
+
+def _without_hub(recording: Recording) -> Recording:
+    """Return the combinations of a recording's channels in which the specific force of its hub cancels.
+
+    The recording itself where it has no array or too few chips for that.
+    """
+    array = recording.array
+    if array is None or array.channels != recording.channels:
+        return recording
+    combinations = null_space(array.axes.T)  # (c, c − rank)
+    if not combinations.shape[1]:
+        return recording
+    names = tuple(f"{number}d" for number in range(combinations.shape[1]))
+    return replace(recording, readings=recording.readings @ combinations, channels=names)

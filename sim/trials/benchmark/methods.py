@@ -1,0 +1,128 @@
+"""Running a method over worlds of the benchmark as a campaign: resumed, on several processes, each world a row."""
+
+from __future__ import annotations
+
+import importlib
+import os
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import msgspec
+
+from gfimu.base.errors import InputError
+from gfimu.base.plugins import user_function
+from sim.trials.benchmark.answer import Answer, answer_of
+from sim.trials.benchmark.real import real_task
+from sim.trials.benchmark.release import MEASURED, RELEASE, cases, find_case
+from sim.trials.benchmark.truth_file import task_of
+from sim.trials.benchmark.world import Task
+from sim.trials.sweep.dataset import Dataset
+from sim.trials.sweep.design import Case
+from sim.trials.sweep.plan import PlanFile
+
+__all__ = ["Method", "answer_task", "answers_of", "benchmark_plan", "benchmark_work", "load_method"]
+
+Method = Callable[[Task], Mapping[str, Any]]
+"""A method: it takes a task and returns the JSON form of an `Answer`; ``world`` and ``method`` are filled in."""
+
+
+def load_method(reference: str) -> Method:
+    """Return a method by ``FILE.py:function`` or ``module:function``.
+
+    Raises
+    ------
+    InputError
+        If the file, module or function is not there, or the file raises an exception.
+    """
+    place, _, function = reference.rpartition(":")
+    if place.endswith(".py"):
+        return user_function(reference, "a method")
+    try:
+        return getattr(importlib.import_module(place), function)  # type: ignore[no-any-return]
+    except (ImportError, AttributeError, ValueError) as error:  # ValueError: no module is named
+        raise InputError(f"{reference}: {error}; give a method as FILE.py:FUNCTION") from None
+
+
+def benchmark_plan(
+    reference: str, sets: Sequence[str], split: str, limit: int | None = None, data: str = ""
+) -> PlanFile:
+    """Return the plan of a run: worlds and method.
+
+    Parameters
+    ----------
+    reference : str
+        Method, as `load_method` takes it.
+    sets : sequence of str
+        Names of sets.
+    split : str
+        ``dev`` or ``test``.
+    limit : int, optional
+        Only so many worlds of each set; they stand in a fixed random order.
+    data : str
+        Folder of the measured data, which the set ``real`` needs.
+
+    Raises
+    ------
+    InputError
+        If there is no such set or split, or measured data are needed and not there.
+    """
+    chosen = [case for name in sets for case in cases(name, split)[:limit]]
+    if not chosen:
+        raise InputError(f"{', '.join(sets)}: has no worlds in the split {split}; choose another one")
+    for case in chosen:
+        if case.generator == MEASURED:
+            real_task(case.world, data)
+    factors: dict[str, Any] = {"world": [case.world for case in chosen], "method": [reference], "release": [RELEASE]}
+    return PlanFile(factors | ({"data": [data]} if data else {}), kind="benchmark", batch=1)
+
+
+def benchmark_work(case: Case) -> dict[str, Any]:
+    """Run the method of a plan on a world; the whole answer is one column of JSON."""
+    world, reference = str(case.values["world"]), str(case.values["method"])
+    measured = find_case(world).generator == MEASURED
+    task = real_task(world, str(case.values["data"])) if measured else task_of(world)
+    answer = answer_task(load_method(reference), task)
+    return {
+        "verdict": answer.verdict,
+        "processor_s": answer.processor_s,
+        "answer": msgspec.json.encode(answer).decode(),
+    }
+
+
+def answer_task(method: Method, task: Task) -> Answer:
+    """Let a method answer a task; what it raises becomes an answer with the verdict ``error``."""
+    start = _processor_time()
+    try:
+        found = {**method(task), "world": task.world}
+        answer = answer_of(_plain(found), f"answer for {task.world}")
+    except Exception as error:  # noqa: BLE001 - whatever a foreign method may raise is an outcome that counts
+        first = next(iter(f"{type(error).__name__}: {error}".splitlines()), "")
+        answer = Answer(task.world, "error", error=first)
+    return msgspec.structs.replace(answer, processor_s=_processor_time() - start)
+
+
+def answers_of(dataset: Dataset, name: str) -> list[Answer]:
+    """Return the answers in the folder of a run, by a method called ``name``; a worker that died is an error."""
+    found = []
+    for row in dataset.table().to_pylist():
+        if row["failure"]:
+            answer = Answer(row["world"], "error", error=row["failure"])
+        else:
+            answer = msgspec.json.decode(row["answer"], type=Answer)
+        found.append(msgspec.structs.replace(answer, method=name))
+    return found
+
+
+def _plain(value: Any) -> Any:
+    """Turn numbers and arrays of NumPy into plain ones."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return value.tolist() if hasattr(value, "tolist") else value
+
+
+def _processor_time() -> float:
+    """Return the processor time of this process and those it has ended, s."""
+    times = os.times()
+    return times.user + times.system + times.children_user + times.children_system

@@ -1,0 +1,159 @@
+"""Units of an array with errors drawn inside its tolerances, and what their boards record.
+
+Each unit has its own places and rotations of the chips and its own chip errors; the physics is that of MuJoCo
+(`sim.rigs.turntable.prescribed_readings`) with the array as built, so nothing here is linearised. Converter, bandwidth
+and sampling are ideal: they are no tolerances.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.short_repr import short_repr
+from gfimu.budget.tolerances.known_motion import KnownMotion
+from gfimu.budget.tolerances.tolerances import Tolerances
+from gfimu.recording import Recording
+from gfimu.recording.carried_array import array_metadata
+from sim.chips.adxl345 import SensorErrors
+from sim.motions.motion import BodyState
+from sim.motions.profiles import Hold, Ramp, Segment, spin_profile
+from sim.rigs.turntable import prescribed_readings
+from sim.scenarios import Scenario
+from sim.truth import cube_state
+
+__all__ = [
+    "CALIBRATED_AT",
+    "LEAST_TIME_S",
+    "REST_S",
+    "ToleranceUnit",
+    "draw_unit",
+    "known_motion_of",
+    "reference_motion",
+]
+
+Floats = NDArray[np.float64]
+
+CALIBRATED_AT = 25.0
+"""Temperature of the data sheets' figures and of a calibration, °C."""
+
+REST_S = 1.5
+"""Rest at the start of the reference motion, s."""
+
+_RAMP_S = 0.5
+LEAST_TIME_S = REST_S + _RAMP_S
+"""Shortest reference motion: its rest and its ramp, s."""
+
+
+@dataclass(frozen=True)
+class ToleranceUnit:
+    """One unit.
+
+    Parameters
+    ----------
+    array : AccelerometerArray
+        The array as built.
+    errors : SensorErrors
+        Errors of its chips.
+    noise : ndarray, shape (c,)
+        White noise of a sample of each channel, standard deviation, m/s².
+    """
+
+    array: AccelerometerArray
+    errors: SensorErrors
+    noise: Floats
+
+    __repr__ = short_repr
+
+    def record(self, scenario: Scenario, rng: np.random.Generator, *, temperature: float = CALIBRATED_AT) -> Recording:
+        """Record the motion of a scenario; its sensors and effects are not looked at.
+
+        Parameters
+        ----------
+        scenario : Scenario
+            Motion, duration, sample rate, mounting and gravity.
+        rng : numpy.random.Generator
+            Source of the white noise.
+        temperature : float
+            Of the board, °C.
+
+        Returns
+        -------
+        Recording
+            Readings in m/s², with the array of the scenario, which is the drawing.
+        """
+        t = _times(scenario)
+        built = replace(scenario, array=self.array)
+        force = prescribed_readings(built.world, scenario.motion, t)  # type: ignore[arg-type]
+        readings = self.errors.distort(force, np.full(len(t), temperature))
+        readings += self.noise * rng.standard_normal(readings.shape)
+        metadata = {**array_metadata(scenario.array), "mounting_rotvec_rad": list(scenario.mounting_rotvec)}
+        return Recording(t, readings, scenario.array.channels, {}, metadata)
+
+
+def draw_unit(array: AccelerometerArray, tolerances: Tolerances, rng: np.random.Generator) -> ToleranceUnit:
+    """Draw a unit.
+
+    Parameters
+    ----------
+    array : AccelerometerArray
+        The drawing.
+    tolerances : Tolerances
+        Limits and standard deviations.
+    rng : numpy.random.Generator
+        Random number generator.
+    """
+    k, c = len(array.chips), array.n_channels
+
+    def machined(limit: float, std: float) -> Floats:
+        size = (k, 3)
+        return rng.uniform(-limit, limit, size) if tolerances.shape == "uniform" else std * rng.standard_normal(size)
+
+    places = array.chip_positions + machined(tolerances.placement_m, tolerances.placement_std)
+    turns = Rotation.from_rotvec(machined(tolerances.angle_rad, tolerances.angle_std))
+    axes = [turn.apply(chip.axes) for turn, chip in zip(turns, array.chips, strict=True)]
+    same_chip = (array.chip_of_channel[:, None] == array.chip_of_channel) & ~np.eye(c, dtype=bool)
+    errors = replace(
+        SensorErrors.none(c),
+        bias=tolerances.bias * rng.standard_normal(c),
+        scale=tolerances.gain * rng.standard_normal(c),
+        cross_axis=rng.standard_normal((c, c)) * tolerances.cross_axis[:, None] * same_chip,
+        quadratic=tolerances.quadratic * rng.standard_normal(c),
+        bias_temperature=tolerances.bias_tempco * rng.standard_normal(c),
+        scale_temperature=tolerances.gain_tempco * rng.standard_normal(c),
+    )
+    return ToleranceUnit(array.with_geometry(places, axes), errors, tolerances.noise)
+
+
+def reference_motion(array: AccelerometerArray, *, time: float, rate: float, sample_rate: float = 100.0) -> Scenario:
+    """Return the motion in which arrays are compared: level at rest, then spun up about the vertical and held.
+
+    Parameters
+    ----------
+    array : AccelerometerArray
+        The array, its origin on the axis.
+    time : float
+        Length, s, longer than `LEAST_TIME_S`.
+    rate : float
+        Rate that is held, rad/s.
+    sample_rate : float
+        Sample rate, Hz.
+    """
+    pieces: list[Segment] = [Hold(REST_S), Ramp(rate, _RAMP_S), Hold(time - LEAST_TIME_S)]
+    return Scenario("reference motion", array, spin_profile(pieces), time, sample_rate, cube_offset=(0.0, 0.0, 0.0))
+
+
+def known_motion_of(scenario: Scenario) -> KnownMotion:
+    """Return the true motion of a scenario at its samples."""
+    state = scenario.motion.at(t := _times(scenario))
+    body = state if isinstance(state, BodyState) else cube_state(scenario.world, state)
+    p = np.einsum("nji,nj->ni", body.rotation, body.acceleration + np.array([0.0, 0.0, scenario.gravity]))
+    return KnownMotion(t, p, body.alpha, body.omega, body.rotation, scenario.gravity)
+
+
+def _times(scenario: Scenario) -> Floats:
+    return np.arange(round(scenario.duration * scenario.sample_rate)) / scenario.sample_rate

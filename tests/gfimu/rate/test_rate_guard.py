@@ -1,0 +1,283 @@
+"""The filter does not diverge: noise, tones and spins at the start, and the guard that starts it again."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rate_worlds import Motion, cube, measure, sensor_errors, tumble
+
+import gfimu
+from gfimu import AccelerometerArray, Recording, SensorErrors
+from gfimu.array.kinematics import omega_products
+from gfimu.array.parts.part import white_noise_std
+from gfimu.motion.estimate_summary import summarise
+from gfimu.rate.filter import filter_rate
+from gfimu.rate.guard import Guard
+from gfimu.rate.kalman import FilterSettings, KalmanRateFilter, join
+from gfimu.rate.live import LiveRateFilter
+from gfimu.rate.methods import estimate_rate
+from gfimu.rate.rest_test import shown_variance
+from gfimu.rate.sensing import ChannelTables
+from gfimu.rate.smoother import smooth_rate
+from gfimu.rate.start import CONTRADICTION, contradicts_biases, contradicts_rest
+
+METHODS = ("filter", "smoother", "live")
+ARRAYS = {"cube12": 100.0, "mimu4444": 62.5, "corners8": 100.0, "p3_three_plus_one": 100.0}
+CALIBRATED = 0.01  # m/s², of the biases
+
+
+def solved(method, array, t, readings, errors, settings=None):
+    """ω (n, 3), its standard deviation (n, 3), the channel report and the sign."""
+    if method == "live":
+        live = LiveRateFilter(array, errors, float(np.median(np.diff(t))), settings)
+        parts = [live.push(t, readings), live.finish()]
+        omega, std = (np.concatenate([getattr(part, name) for part in parts]) for name in ("omega", "std"))
+        return omega, std, live.report, live.sign.state
+    found = estimate_rate(array, t, readings, errors, method=method, settings=settings)
+    return found.omega, found.std, found.channels, found.sign.state
+
+
+def steady(name, omega, errors, rng, *, seconds=6.0, factor=1.0):
+    """Times and readings of a steady rate about the vertical, with biases and noise of the errors."""
+    array, rate = AccelerometerArray.load(name), ARRAYS[name]
+    t = np.arange(round(seconds * rate)) / rate
+    up = rng.standard_normal(3) if not np.any(omega) else omega
+    still = array.regression_matrix[:, 3:] @ (9.81 * up / np.linalg.norm(up))
+    still = still + array.centripetal_matrix @ omega_products(omega) + errors.bias_std * rng.standard_normal(len(still))
+    return t, still + factor * white_noise_std(array, rate) * rng.standard_normal((len(t), len(still)))
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("factor", [0.5, 1.3, 3.0])
+@pytest.mark.parametrize("name", ARRAYS)
+def test_rest_with_other_noise_than_the_data_sheets(name, factor, method):
+    array = AccelerometerArray.load(name)
+    errors = SensorErrors.from_parts(array, ARRAYS[name])
+    within = []
+    for seed in range(3):
+        t, readings = steady(name, np.zeros(3), errors, np.random.default_rng([41, seed]), factor=factor)
+        omega, std, report, _ = solved(method, array, t, readings, errors)
+        within.append((np.abs(omega) < 4 * std).all(axis=1))
+        assert report.samples_without_rate == 0
+    assert np.mean(within) >= 0.99
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(("hertz", "size"), [(12.5, 0.16), (7.0, 0.16), (12.5, 0.3)])
+def test_a_tone_in_one_channel_at_rest(method, hertz, size):
+    array = AccelerometerArray.load("mimu4444")
+    errors = SensorErrors.from_parts(array, 62.5)
+    t, readings = steady("mimu4444", np.zeros(3), errors, np.random.default_rng(5))
+    readings[:, 9] += size * np.sin(2 * np.pi * hertz * t + 0.4)
+    omega, std, _, _ = solved(method, array, t, readings, errors)
+    assert np.mean((np.abs(omega) < 4 * std).all(axis=1)) >= 0.99
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_recorded_rest_with_a_tone(shared_data, method):
+    run = Recording.read(shared_data / "public" / "rest_with_tone.csv")
+    errors = SensorErrors.from_parts(run.array, run.sample_rate)
+    omega, std, _, _ = solved(method, run.array, run.t_s, run.for_array(run.array), errors)
+    assert np.all(np.linalg.norm(omega, axis=1) - 4 * np.linalg.norm(std, axis=1) < 1.0)
+    assert np.mean((np.abs(omega) < 4 * std).all(axis=1)) >= 0.99
+
+
+@pytest.mark.parametrize("method", [*METHODS, "ml"])
+@pytest.mark.parametrize("speed", [2.0, 8.0])
+def test_a_steady_spin_from_the_first_sample_of_a_calibrated_array(speed, method):
+    errors = SensorErrors.from_parts(AccelerometerArray.load("cube12"), 100.0, bias_std=CALIBRATED)
+    rng = np.random.default_rng(3)
+    truth = np.array([0.48, -0.6, 0.64]) * speed
+    t, readings = steady("cube12", truth, errors, rng)
+    omega, std, _, sign = solved(method, AccelerometerArray.load("cube12"), t, readings, errors)
+    side = np.where(omega @ truth < 0, -1.0, 1.0)[:, None]
+    assert np.mean((np.abs(side * omega - truth) < 4 * std).all(axis=1)) >= 0.99
+    assert sign == "undecided"
+    if method != "ml":
+        assert np.linalg.norm(omega[-1]) == pytest.approx(speed, rel=0.05)
+
+
+def test_the_start_is_contradicted_from_its_threshold_on():
+    """At one bias the evidence of the null space grows with the fourth power of the rate."""
+    array = AccelerometerArray.load("cube12")
+    errors = SensorErrors.from_parts(array, 100.0, bias_std=CALIBRATED)
+    sheet = SensorErrors.from_parts(array, 100.0)
+    null = ChannelTables(array, errors)
+    pattern = array.centripetal_matrix @ omega_products([0.0, 0.0, 1.0])
+    spread = null.bias_covariance(errors.bias_std)[3:, 3:] + np.eye(null.n_null) / 12
+    seen = null.null_rows[0] @ pattern
+    unit = float(seen @ np.linalg.solve(spread, seen))
+    for share, expected in ((0.9, False), (1.1, True)):
+        readings = np.tile(pattern * np.sqrt(share * CONTRADICTION / unit), (12, 1))
+        assert contradicts_rest(array, readings, errors) is expected
+        assert not contradicts_rest(array, readings, sheet)
+        assert not contradicts_biases(array, readings, errors)  # a rate explains them
+        # Squares of the rate are positive: no rate explains readings of the other sign, so the biases are others.
+        assert contradicts_biases(array, -readings, errors) is expected
+        assert not contradicts_rest(array, -readings, errors)
+        assert not contradicts_biases(array, -readings, sheet)
+
+
+def late(motion, first):
+    return Motion(motion.t[first:] - motion.t[first], *(one[first:] for one in (motion.omega, motion.alpha, motion.p)))
+
+
+TUMBLE = late(tumble(100.0, 6.0, duration=16.0), 600)
+CUBE = cube(0.1)
+ERRORS = replace(sensor_errors(CUBE, 100.0), bias_std=np.full(12, CALIBRATED))
+KNOWN = FilterSettings(start_omega=TUMBLE.omega[0], start_std=0.01)
+
+
+def contradicted(kind):
+    """Readings of a tumble, settings of the filter, and the samples (first, last) that it may have no rate for."""
+    rng = np.random.default_rng(1)
+    readings = measure(CUBE, TUMBLE, rng, bias=CALIBRATED, quantise=False)
+    if kind == "rest stated":
+        return readings, FilterSettings(rest=None), (0, 60)
+    if kind == "wrong start":
+        return readings, FilterSettings(start_omega=np.array([5.0, 0.0, 0.0]), start_std=0.01), (0, 60)
+    if kind == "step":
+        readings[400:, 1] += 3.0
+        return readings, KNOWN, (400, 1000)
+    if kind == "burst":
+        readings[400:430] += 30.0 * rng.standard_normal((30, 12))
+        return readings, KNOWN, (400, 460)
+    if kind == "long burst":
+        readings[400:520] += 30.0 * rng.standard_normal((120, 12))
+        return readings, KNOWN, (400, 610)
+    return readings, KNOWN, (0, 0)
+
+
+@pytest.mark.parametrize("solve", [filter_rate, smooth_rate])
+@pytest.mark.parametrize("kind", ["none", "rest stated", "wrong start", "step", "burst", "long burst"])
+def test_readings_that_contradict_the_filter(kind, solve):
+    readings, settings, (first, last) = contradicted(kind)
+    found = solve(CUBE, TUMBLE.t, readings, ERRORS, settings)
+    usable = np.isfinite(found.omega).all(axis=1)
+    assert np.array_equal(usable, np.isfinite(found.std).all(axis=1))
+    outside = np.ones(len(usable), dtype=bool)
+    outside[max(0, first - 50) : last] = False
+    assert usable[outside].all()
+    assert np.mean((np.abs(found.omega - TUMBLE.omega) < 4 * found.std).all(axis=1)[usable]) >= 0.99
+    if kind == "none":
+        assert (found.channels.restarts, found.channels.samples_without_rate) == (0, 0)
+    elif kind == "step":  # ten times what noise and biases allow, to the end
+        assert not usable[500:].any()
+    else:
+        assert found.channels.restarts == 1
+        assert found.sign.state != "known"
+
+
+def test_the_guard_is_the_same_live_and_in_blocks():
+    readings, settings, _ = contradicted("long burst")
+    whole, single = (KalmanRateFilter(CUBE, ERRORS, 0.01, settings) for _ in range(2))
+    block = join([whole.push(TUMBLE.t, readings), whole.finish()]).columns
+    each = [single.push(t, row) for t, row in zip(TUMBLE.t, readings, strict=True)] + [single.finish()]
+    for one, other in zip(block[:2], join(each).columns[:2], strict=True):
+        np.testing.assert_allclose(other, one, rtol=1e-9, atol=1e-12)
+    assert whole.report == single.report
+    assert whole.report.restarts == 1
+    usable = np.isfinite(block.omega).all(axis=1)
+    assert 40 < np.count_nonzero(~usable) < 120
+    assert np.all(np.abs(block.omega - TUMBLE.omega)[650:] < 0.2)
+
+
+def test_no_restart_in_ten_minutes_of_sound_readings():
+    """1200 windows of 300 degrees of freedom, whose innovations squared never reach ten times their mean by chance."""
+    t = np.arange(60_000) / 100.0
+    rng = np.random.default_rng(2)
+    for motion in (Motion(t, *np.zeros((2, len(t), 3)), np.tile([0, 0, 9.81], (len(t), 1))), TUMBLE):
+        for bias in (None, CALIBRATED):
+            errors = sensor_errors(CUBE, 100.0) if bias is None else ERRORS
+            values = measure(CUBE, motion, rng, bias=float(errors.bias_std[0]), quantise=False)
+            process = KalmanRateFilter(CUBE, errors, 0.01, FilterSettings(start_omega=motion.omega[0]))
+            process.push(motion.t, values)
+            assert process.report.restarts == 0
+            assert process.report.samples_without_rate == 0
+
+
+def window(misfit, rate_error=0.0, omega=(3.0, 0.0, 0.0)):
+    """A window of the null space with no noise, whose samples miss every rate by ``misfit`` times noise and biases."""
+    tables = ChannelTables(CUBE, ERRORS)
+    omega = np.asarray(omega)
+    spread = np.eye(6) + tables.bias_covariance(ERRORS.bias_std)[3:, 3:]
+    slope = np.linalg.solve(np.linalg.cholesky(spread), tables.null_sensitivity[0])
+    z = np.linalg.cholesky(spread) @ (slope @ omega_products(omega) + misfit * no_rate(slope, omega))
+    return np.tile(z, (50, 1)), np.tile(omega + rate_error * np.array([1.0, 0.0, 0.0]), (50, 1)), Guard(tables, ERRORS)
+
+
+def no_rate(slope, omega):
+    """Unit-variance deviation that no change of the rate explains: across the slope of the products."""
+    x, y, z = omega
+    tangent = slope @ np.array([[2 * x, 0, 0], [0, 2 * y, 0], [0, 0, 2 * z], [y, x, 0], [z, 0, x], [0, z, y]])
+    across = np.linalg.svd(tangent)[0][:, 3]
+    return across * np.sqrt(3.0)  # three degrees of freedom remain
+
+
+def test_thresholds_of_the_guard_hold_on_both_sides():
+    complete = np.ones(50, dtype=bool)
+    z, rates, guard = window(0.0)
+    assert not guard.suspects(9.9 * 300, 300)
+    assert guard.suspects(10.1 * 300, 300)
+    assert not guard.judge(z, complete, rates, 1.0).contradicted
+    assert not guard.judge(z, complete, rates, 9.0).contradicted
+    again = guard.judge(z, complete, rates, 11.0)
+    assert (again.contradicted, again.first) == (True, 0)
+    np.testing.assert_allclose(np.abs(again.omega), [3.0, 0.0, 0.0], atol=1e-6)
+    assert not guard.judge(z, complete, window(0.0, 0.05)[1], 2.1).contradicted
+    assert guard.judge(z, complete, window(0.0, 1.0)[1], 2.1).contradicted
+    assert not guard.judge(z, complete, window(0.0, 1.0)[1], 1.9).contradicted
+    assert guard.judge(z, complete & (np.arange(50) < 24), rates, 1.0) is None
+    assert not guard.judge(window(9.0)[0], complete, rates, 50.0).contradicted
+    assert guard.judge(window(11.0)[0], complete, rates, 50.0)[:2] == (True, -1)
+
+
+def test_rows_without_a_rate_are_marked_in_the_estimate_and_its_summary():
+    readings, _, _ = contradicted("step")
+    run = Recording.from_arrays(
+        TUMBLE.t, readings, CUBE, metadata={"bias_std_m_s2": dict.fromkeys(CUBE.channels, 0.01)}
+    )
+    found = gfimu.estimate(run, method="filter", omega0=TUMBLE.omega[0], keep_faulty=True, force=True)
+    marked = ~np.isfinite(found.omega).all(axis=1)
+    assert marked[500:].all()
+    assert not np.isfinite(found.omega_std[marked]).any()
+    summary = summarise(found, run, CUBE)
+    assert summary.samples_without_estimate == marked.sum()
+    assert any("samples have no rate" in warning for warning in summary.warnings)
+    assert summary.restarts == found.metadata["channels"]["restarts"]
+
+
+def test_noise_of_a_block_is_what_its_null_space_shows():
+    rng = np.random.default_rng(4)
+    z = rng.standard_normal((50, 6))
+    assert shown_variance(0.5 * z) == 1.0
+    assert shown_variance(3.0 * z) == pytest.approx(9.0, rel=0.3)
+    step = np.zeros((50, 6))
+    step[25:] = 10.0  # a motion between the halves is none
+    assert shown_variance(z + step) == pytest.approx(shown_variance(z), rel=1e-12)
+
+
+def test_an_inner_function_of_another_file_that_changes_is_compiled_anew(tmp_path, monkeypatch):
+    monkeypatch.setattr("numba.core.config.CACHE_DIR", str(tmp_path / "kept"))
+    monkeypatch.syspath_prepend(str(tmp_path))
+    inner, outer = tmp_path / "inner_part.py", tmp_path / "outer_part.py"
+    text = "from numba import njit\nfrom gfimu.base.compiled import INNER\n"
+    text += "@njit(**INNER)\ndef part(x):\n    return x + {}\n"
+    outer.write_text(
+        "from gfimu.base.compiled import compiled\nfrom inner_part import part\n"
+        "@compiled\ndef whole(x):\n    return 2 * part(x)\n"
+    )
+    results = []
+    for number in (1, 5):
+        inner.write_text(text.format(number))
+        os.utime(inner, (1e9 + number, 1e9 + number))
+        for name in ("inner_part", "outer_part"):
+            sys.modules.pop(name, None)
+        importlib.invalidate_caches()
+        results.append(importlib.import_module("outer_part").whole(1))
+    assert results == [4, 12]

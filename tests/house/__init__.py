@@ -1,0 +1,1 @@
+"""The size and shape of the house, measured from its sources."""
