@@ -34,6 +34,8 @@ PART = re.compile(
     re.DOTALL | re.MULTILINE,
 )
 NUMBER = re.compile(r"[-−+]?\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?")
+PROGRESS = re.compile(r"^gfimu: .+: (?:\d+ %, )?\d+ s(?:: .*)?\n", re.MULTILINE)
+"""A line of progress, which a slow machine prints and a fast one does not."""
 TIME = re.compile(r"\b(?:done in|took) [\d.]+ (?:s|min)\b|(?<=│ processor s)[ │\d.]+")
 
 
@@ -129,7 +131,7 @@ def _output(line: str, code: int, folder: Path, environment: dict[str, str]) -> 
     done = subprocess.run(
         call, cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=False
     )
-    text = done.stdout.decode("utf-8").replace(f"{folder}/", "")
+    text = PROGRESS.sub("", done.stdout.decode("utf-8").replace(f"{folder}/", ""))
     if done.returncode != code:
         raise RuntimeError(f"{line}\nended with exit code {done.returncode} instead of {code}:\n{text}")
     return "\n".join([line, *(row.rstrip() for row in text.rstrip().splitlines())]) + "\n"

@@ -127,6 +127,19 @@ def test_a_signal_that_a_library_of_c_swallows_is_sent_again(number):
     assert (done.stdout, done.stderr) == (f"{128 + number}\n", "")
 
 
+@pytest.mark.parametrize("error", [SystemError("error return"), ImportError("initialization failed")])
+def test_ctrl_c_while_compiled_code_runs_or_starts_is_the_cause_of_its_error(error):
+    from gfimu.commands.shell.stop_signals import Stop
+
+    stop = Stop()
+    assert not stop.is_cause_of(error)
+    with pytest.raises(KeyboardInterrupt):
+        stop(signal.SIGINT, None)
+    assert stop.is_cause_of(error)
+    assert not stop.is_cause_of(OSError("disk full"))
+    assert not stop.is_cause_of(SystemExit(2))
+
+
 @pytest.mark.parametrize("name", CALLS)
 def test_ctrl_c(here, name):
     code, out, error = stopped(here, [name, *CALLS[name].split()], signal.SIGINT)

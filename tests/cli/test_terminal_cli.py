@@ -179,7 +179,7 @@ with output.progress("looking") as done:
     assert done.stdout == ""
     assert lines[0].startswith("gfimu: working: 25 %, ")
     assert lines[0].endswith(" s: on the first half")
-    assert lines[-1] == "gfimu: looking: 0 s: looking"
+    assert lines[-1] == "gfimu: looking: 0 s"
     assert 3 <= len(lines) <= 5
 
 

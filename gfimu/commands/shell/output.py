@@ -145,10 +145,11 @@ def _progress_lines(description: str, total: float | None) -> Iterator[Any]:
         while not over.wait(_LINE_S):
             done, text = now
             share = f"{100.0 * done / total:.0f} %, " if total else ""
-            line = f"gfimu: {description}: {share}{time.monotonic() - began:.0f} s: {text}\n"
+            state = text.removeprefix(description).removeprefix(": ")
+            line = ": ".join(["gfimu", description, f"{share}{time.monotonic() - began:.0f} s", *filter(None, [state])])
             # At once and without a lock, which a process that is split off meanwhile would find taken.
             with suppress(OSError, ValueError):
-                os.write(sys.stderr.fileno(), line.encode(errors="backslashreplace"))
+                os.write(sys.stderr.fileno(), f"{line}\n".encode(errors="backslashreplace"))
 
     writer = threading.Thread(target=write, daemon=True)
     writer.start()

@@ -43,8 +43,8 @@ class Stop:
             return False
         if self.received == signal.SIGTERM:
             return True
-        # Compiled code that a signal interrupts returns with its exception set, for which Python has this error.
-        return self.received is not None and isinstance(error, SystemError)
+        # Python has these errors for compiled code that a signal interrupts, and for a compiled module's start.
+        return self.received is not None and isinstance(error, SystemError | ImportError)
 
     @property
     def words(self) -> str:
