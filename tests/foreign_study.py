@@ -18,7 +18,7 @@ import foreign_world
 import msgspec
 import numpy as np
 
-from gfimu.base.errors import GfimuError
+from gfimu import GfimuError
 from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.diagnosis import diagnose
 from gfimu.diagnosis.data.prepared_runs import PreparedRuns

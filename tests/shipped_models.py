@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from gfimu.array.array import AccelerometerArray
+from gfimu import AccelerometerArray
 from gfimu.array.parts.limits import PartLimits
 from gfimu.array.parts.part import Part
 from gfimu.base.files.model_files import list_models

@@ -11,7 +11,7 @@ import pytest
 from every_item import every
 from test_docs_words import VAGUE
 
-from gfimu.base.errors import InputError
+from gfimu import InputError
 from gfimu.base.files.model_files import effect_catalogue
 from gfimu.diagnosis.design.proposal import SEPARATED
 from gfimu.diagnosis.policy import Policy

@@ -19,7 +19,7 @@ from foreign_world import (
     new_recording,
 )
 
-from gfimu.array.array import AccelerometerArray
+from gfimu import AccelerometerArray
 from sim import forward
 from sim.effects import EFFECTS
 from sim.motions.motion import SplineSpin

@@ -9,7 +9,8 @@ import tomllib
 
 import pytest
 
-from gfimu.base.errors import GfimuError, InputError, MissingPackageError, OmittedFileWarning
+from gfimu import GfimuError, InputError, MissingPackageError
+from gfimu.base.errors import OmittedFileWarning
 from gfimu.base.optional_packages import OPTIONAL, install_command, missing, packages_of, require
 
 BLOCKED_BY_PACKAGE = ("sim/rigs/",)

@@ -7,10 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gfimu import AccelerometerArray, Estimate, Recording, specific_force
-from gfimu.array.gravity import local_gravity
+from gfimu import AccelerometerArray, Estimate, Recording, load_calibration, local_gravity, specific_force
 from gfimu.calibration.registry import METHODS
-from gfimu.calibration.result import load_calibration
 from gfimu.sensor_noise import white_noise
 
 CUBE = AccelerometerArray.load("cube12")

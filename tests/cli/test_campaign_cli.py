@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from gfimu.base.errors import RecordingWarning
+from gfimu import RecordingWarning
 
 PLAN = """
 repeats = 1

@@ -8,8 +8,7 @@ import sys
 import numpy as np
 import pytest
 
-from gfimu import AccelerometerArray, Recording
-from gfimu.base.errors import GfimuError
+from gfimu import AccelerometerArray, GfimuError, Recording
 from gfimu.recording.formats import open_run
 from sim.simulation import simulate
 

@@ -9,7 +9,7 @@ import sys
 import numpy as np
 import pytest
 
-from gfimu.calibration.result import load_calibration
+from gfimu import load_calibration
 from gfimu.recording import Recording
 from gfimu.recording.importing import inspect_file
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import gfimu
+from gfimu import Calibration
 from gfimu.calibration.parameter_names import parameter_names
-from gfimu.calibration.result import Calibration
 
 METHODS = (
     ("six-position", 12),

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from gfimu.commands.list import catalogue
+from gfimu import catalogue
 from gfimu.commands.shell.completion import effects, shown
 
 PROGRAM = [sys.executable, "-c", "from gfimu.commands.shell.program import main; main()"]

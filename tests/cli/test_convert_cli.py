@@ -6,8 +6,8 @@ import mujoco
 import numpy as np
 import pytest
 
+from gfimu import Calibration
 from gfimu.calibration.parameter_names import parameter_names
-from gfimu.calibration.result import Calibration
 from gfimu.recording import Recording
 
 

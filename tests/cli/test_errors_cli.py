@@ -15,7 +15,7 @@ import pytest
 
 import gfimu
 import gfimu.commands.score
-from gfimu.base.errors import GfimuError, WriteError
+from gfimu import GfimuError, WriteError
 from gfimu.base.files.atomic_file import atomic_path, write_text
 from gfimu.commands.shell import output
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import gfimu
-from gfimu.base.errors import InputError, RecordingWarning
+from gfimu import InputError, RecordingWarning
 from gfimu.commands.diagnose import EXPLAINED
 from gfimu.recording.checks import check_recording, examine
 

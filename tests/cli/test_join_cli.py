@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gfimu.array.array import AccelerometerArray
+from gfimu import AccelerometerArray
 from gfimu.diagnosis import diagnose
 from gfimu.recording import Recording
 from sim.effects import make_effect

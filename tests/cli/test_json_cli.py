@@ -14,8 +14,8 @@ import msgspec
 import pytest
 
 import gfimu
+from gfimu import InputError
 from gfimu.base.declared import struct_of
-from gfimu.base.errors import InputError
 from gfimu.commands.schema import schema_names
 from gfimu.commands.shell.program import program
 from gfimu.commands.show import Shown

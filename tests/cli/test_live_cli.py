@@ -13,9 +13,8 @@ import numpy as np
 import pytest
 
 from firmware_bridge.host.journal import Journal
-from gfimu.array.array import AccelerometerArray
+from gfimu import AccelerometerArray, SensorErrors
 from gfimu.rate.filter import filter_rate
-from gfimu.rate.sensing import SensorErrors
 
 CUBE = AccelerometerArray.load("cube12")
 RATE = 100.0

@@ -8,7 +8,7 @@ import typer
 from every_item import every
 
 import gfimu
-from gfimu.array.array import AccelerometerArray
+from gfimu import AccelerometerArray
 from gfimu.commands.shell.command_list import COMMANDS, help_line
 from gfimu.commands.shell.program import program
 from gfimu.recording import Recording

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from gfimu.array.array import AccelerometerArray
+from gfimu import AccelerometerArray
 from gfimu.array.observability import seeing_arrays
 
 

@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 
 import gfimu
+from gfimu import load_map
 from gfimu.base.files.rerun_stream import markdown
 from gfimu.commands.shell.output import print_table
-from gfimu.recording.importing import load_map
 
 pty = pytest.importorskip("pty")
 fcntl = pytest.importorskip("fcntl")

@@ -10,8 +10,8 @@ import sys
 import numpy as np
 import pytest
 
-from gfimu.diagnosis.diagnose import diagnose
-from gfimu.recording.mimu4444 import read_mimu4444
+from gfimu import read_mimu4444
+from gfimu.diagnosis import diagnose
 from sim.twin import Twin
 
 

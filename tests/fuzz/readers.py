@@ -43,13 +43,12 @@ def targets(folder: Path) -> dict[str, Target]:
     import field_files
     import foreign_files as foreign
 
-    from gfimu.array.array import AccelerometerArray
+    from gfimu import AccelerometerArray, load_calibration, load_map, open_recording
     from gfimu.array.parts.part import Part
     from gfimu.base.files.model_files import list_models
     from gfimu.calibration.imu_tk import read_text_triad
-    from gfimu.calibration.result import load_calibration
-    from gfimu.recording.formats import open_recording, open_run
-    from gfimu.recording.importing import inspect_file, load_map
+    from gfimu.recording.formats import open_run
+    from gfimu.recording.importing import inspect_file
     from gfimu.recording.joining import open_reference
     from sim.rigs.mjcf_array import array_from_mjcf
     from sim.scenarios import Scenario
@@ -242,7 +241,7 @@ def _frames(path: Path) -> None:
 
 
 def _live(path: Path) -> None:
-    from gfimu.commands.live import live
+    from gfimu import live
 
     for _ in live("cube12", 100.0, source=path):
         pass

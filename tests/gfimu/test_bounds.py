@@ -6,16 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from gfimu.array.array import AccelerometerArray
-from gfimu.array.kinematics import omega_products, specific_force
-from gfimu.base.errors import InputError
-from gfimu.rate.bounds.sample import (
-    alpha_std,
-    omega_products_jacobian,
-    rate_bound,
-    rate_bound_isotropic,
-    rate_information,
-)
+from gfimu import AccelerometerArray, InputError, rate_bound, specific_force
+from gfimu.array.kinematics import omega_products
+from gfimu.rate.bounds.sample import alpha_std, omega_products_jacobian, rate_bound_isotropic, rate_information
 
 rates = hnp.arrays(float, (3,), elements=st.floats(-40.0, 40.0)).filter(lambda w: np.linalg.norm(w) > 0.1)
 

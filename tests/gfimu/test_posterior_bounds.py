@@ -6,11 +6,8 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from gfimu.array.array import AccelerometerArray
-from gfimu.base.errors import InputError
-from gfimu.rate.bounds.posterior import posterior_rate_bound
+from gfimu import AccelerometerArray, InputError, SensorErrors, posterior_rate_bound
 from gfimu.rate.bounds.sample import alpha_std, steady_rate_bound
-from gfimu.rate.sensing import SensorErrors
 
 CUBE = AccelerometerArray.load("cube12")
 NOISE = 0.03

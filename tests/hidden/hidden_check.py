@@ -9,8 +9,8 @@ from typing import Any
 
 from hidden_table import SOURCES, Hidden
 
+from gfimu import NamedCause
 from gfimu.diagnosis import Diagnosis, diagnose
-from gfimu.diagnosis.verdict.parts import NamedCause
 from sim.trials.study.outcome import HiddenWorld, draw_world
 from sim.trials.worlds.z_scores import z_scores
 

@@ -5,8 +5,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import gfimu
-from gfimu import AccelerometerArray, EarthRotation
-from gfimu.array.gravity import EARTH_RATE, local_gravity
+from gfimu import AccelerometerArray, EarthRotation, local_gravity
+from gfimu.array.gravity import EARTH_RATE
 from sim.earth import earth_readings
 from sim.motions.motion import BodyState
 from sim.scenarios import Scenario

@@ -5,9 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from gfimu.array.array import AccelerometerArray
-from gfimu.array.kinematics import specific_force
-from gfimu.base.errors import InputError
+from gfimu import AccelerometerArray, InputError, specific_force
 from gfimu.base.files.model_files import list_models
 from gfimu.recording import Recording
 from sim.effects import make_effect

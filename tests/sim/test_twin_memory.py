@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from gfimu.array.array import AccelerometerArray
+from gfimu import AccelerometerArray
 from sim import forward
 from sim.effects import make_effect
 from sim.motions.motion import SplineSpin

@@ -19,7 +19,7 @@ from firmware_bridge.frames.delimited import decode_cobs, decode_slip
 from firmware_bridge.frames.format_file import load_format
 from firmware_bridge.host.recorder import record
 from firmware_bridge.loop.virtual_port import TcpPort
-from gfimu.base.errors import InputError
+from gfimu import InputError
 from gfimu.recording import Recording
 
 CHECK = {  # of "123456789", from the CRC catalogue; sums by hand: 9 · 0x35, and 1 xor … xor 9
@@ -292,8 +292,8 @@ def test_optional_columns_are_the_last_ones(tmp_path) -> None:
 
 
 def test_a_format_with_an_array_file_of_its_own_is_recorded_with_it(warm_files) -> None:
-    from gfimu.commands.record import record as record_command
-    from gfimu.commands.record_settings import BoardSettings
+    from gfimu import BoardSettings
+    from gfimu import record as record_command
 
     (warm_files / "warm.toml").write_text(WARM_PACKET)
     port = TcpPort(0)

@@ -23,8 +23,7 @@ from firmware_bridge.frames.decoder import (
     encode_samples,
     frame_format,
 )
-from gfimu.base.errors import InputError
-from gfimu.recording.mimu4444 import read_mimu4444
+from gfimu import InputError, read_mimu4444
 
 FRAME = LPC1768_DTYPE.itemsize
 

@@ -14,7 +14,7 @@ from firmware_bridge.frames.commands import Dialogue, Identity, Reply, Result, s
 from firmware_bridge.frames.decoder import FORMATS, FrameFormat, SampleDecoder, frame_format
 from firmware_bridge.frames.packets import PacketLayout
 from firmware_bridge.host.recorder import record
-from gfimu.base.errors import InputError
+from gfimu import InputError
 from gfimu.recording import Recording
 
 MISSING = -(1 << 31)

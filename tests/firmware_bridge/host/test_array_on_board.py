@@ -17,10 +17,7 @@ from firmware_bridge.frames.frame_format import FORMATS
 from firmware_bridge.host.mounting.on_board import candidate_arrays, mounting_words
 from firmware_bridge.host.recorder import record as record_port
 from firmware_bridge.loop.virtual_port import TcpPort
-from gfimu.array.array import AccelerometerArray
-from gfimu.base.errors import InputError, RecordingWarning
-from gfimu.commands.record import record
-from gfimu.commands.record_settings import BoardSettings, RecordCallbacks
+from gfimu import AccelerometerArray, BoardSettings, InputError, RecordCallbacks, RecordingWarning, record
 from gfimu.recording import Recording
 from sim.scenarios import Scenario
 from sim.simulation import simulate

@@ -10,9 +10,7 @@ import numpy as np
 import pytest
 
 from firmware_bridge.loop.virtual_port import TcpPort
-from gfimu import calibrate, check, inspect
-from gfimu.commands.record import record
-from gfimu.commands.record_settings import BoardSettings
+from gfimu import BoardSettings, calibrate, check, inspect, record
 from gfimu.commands.shell.printing import print_blocks
 from gfimu.recording import Recording
 from sim.scenarios import Scenario

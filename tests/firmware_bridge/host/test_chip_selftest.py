@@ -9,7 +9,7 @@ import pytest
 
 from firmware_bridge.host.chip_selftest import check_chips, judge
 from firmware_bridge.loop.virtual_port import open_port, serve
-from gfimu.base.errors import InputError
+from gfimu import InputError
 
 CHANNELS = tuple(f"a{chip}{axis}" for chip in (1, 2) for axis in (1, 2, 3))
 

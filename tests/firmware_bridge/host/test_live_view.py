@@ -14,12 +14,10 @@ from firmware_bridge.host import live
 from firmware_bridge.host.live import LiveView
 from firmware_bridge.host.recorder import Batch
 from firmware_bridge.host.stream_meter import GroupMeans, StreamMeter
-from gfimu.array.array import AccelerometerArray
+from gfimu import AccelerometerArray, LiveRateFilter, SensorErrors
 from gfimu.rate.health.fault import HealthCode
 from gfimu.rate.health.live import background
 from gfimu.rate.health.live.background import BackgroundFilter
-from gfimu.rate.live import LiveRateFilter
-from gfimu.rate.sensing import SensorErrors
 
 CUBE = AccelerometerArray.load("cube12")
 COUNTS = StreamCounts(0, 0, 2, 1, 0, 0)

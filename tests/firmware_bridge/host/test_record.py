@@ -19,8 +19,7 @@ from firmware_bridge.frames.decoder import encode_samples
 from firmware_bridge.host.link import Link
 from firmware_bridge.host.recorder import SampleClock, record
 from firmware_bridge.loop.virtual_port import open_port, serve
-from gfimu.array.array import AccelerometerArray
-from gfimu.base.errors import GfimuError, InputError
+from gfimu import AccelerometerArray, GfimuError, InputError
 from gfimu.recording import Recording
 
 needs_board = pytest.mark.skipif(

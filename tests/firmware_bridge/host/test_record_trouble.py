@@ -20,7 +20,7 @@ from firmware_bridge.host.journal import Journal, JournalError
 from firmware_bridge.host.link import Link
 from firmware_bridge.host.recorder import record
 from firmware_bridge.loop.virtual_port import PseudoTerminal
-from gfimu.base.errors import GfimuError, InputError
+from gfimu import GfimuError, InputError
 from gfimu.recording import Recording
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals and limits on Windows")

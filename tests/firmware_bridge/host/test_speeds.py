@@ -17,7 +17,7 @@ from firmware_bridge.host.link import Link
 from firmware_bridge.host.recorder import record
 from firmware_bridge.loop.line_speed import as_received
 from firmware_bridge.loop.virtual_port import open_port, serve
-from gfimu.base.errors import InputError
+from gfimu import InputError
 from gfimu.recording import Recording
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the speed of a pseudo-terminal is read on Linux")

@@ -15,7 +15,7 @@ pytest.importorskip("unicorn", reason="the emulator is in the extra 'firmware'")
 from firmware_bridge.adxl345.registers import Adxl345Options
 from firmware_bridge.frames.commands import RATE_CODE_AUTO, Identity
 from firmware_bridge.loop.virtual_run import record_virtual
-from gfimu.array.array import AccelerometerArray
+from gfimu import AccelerometerArray
 from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.recording.timing.conversion_times import conversion_times
 from sim.chips.adxl345 import SensorErrors

@@ -12,7 +12,7 @@ import pytest
 from firmware_bridge.loop import board_process
 from firmware_bridge.loop.fault_campaign import FAULTS, resample_line, run_fault
 from firmware_bridge.lpc1768.build import FOLDER
-from gfimu.base.errors import InputError
+from gfimu import InputError
 
 needs_board = pytest.mark.skipif(not board_process.emulator_available(), reason="the emulator is in the extra")
 

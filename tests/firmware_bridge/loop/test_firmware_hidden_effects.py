@@ -13,8 +13,8 @@ pytest.importorskip("unicorn", reason="the emulator is in the extra 'firmware'")
 from firmware_bridge.adxl345.registers import Adxl345Options
 from firmware_bridge.loop.virtual_run import record_virtual
 from firmware_bridge.lpc1768.build import build
-from gfimu.diagnosis.diagnose import diagnose
-from gfimu.diagnosis.verdict.verdict import Diagnosis
+from gfimu import Diagnosis
+from gfimu.diagnosis import diagnose
 from gfimu.recording import Recording
 from sim.ride import Ride
 from sim.scenarios import Scenario

@@ -10,8 +10,7 @@ import pytest
 
 from firmware_bridge.adxl345.registers import TICKS_PER_SECOND
 from firmware_bridge.loop.virtual_port import open_port, serve
-from gfimu.commands.record import record
-from gfimu.commands.record_settings import BoardSettings, RecordCallbacks
+from gfimu import BoardSettings, RecordCallbacks, record
 from gfimu.recording import Recording
 
 needs_board = pytest.mark.skipif(

@@ -19,8 +19,7 @@ from firmware_bridge.loop.board_process import BoardProcess
 from firmware_bridge.loop.physics import RidePhysics
 from firmware_bridge.loop.virtual_port import open_port, serve
 from firmware_bridge.loop.virtual_run import record_virtual, typical_chips
-from gfimu.array.array import AccelerometerArray
-from gfimu.base.errors import InputError
+from gfimu import AccelerometerArray, InputError
 from gfimu.motion.estimation import estimate
 from gfimu.recording import Recording
 from sim.ride import Ride

@@ -20,7 +20,7 @@ from firmware_bridge.lpc1768.build import (
     source_hash,
 )
 from firmware_bridge.lpc1768.elf import ElfImage
-from gfimu.base.errors import GfimuError, InputError
+from gfimu import GfimuError, InputError
 
 
 @pytest.mark.parametrize("name", IMAGES)

@@ -23,7 +23,7 @@ from firmware_bridge.frames.commands import (
     set_rate,
 )
 from firmware_bridge.frames.decoder import SampleDecoder, Samples, Status
-from gfimu.base.errors import InputError
+from gfimu import InputError
 
 KINDS = ("python", "fast")
 SETTLE_S, RUN_S = 0.3, 10.0

@@ -9,7 +9,7 @@ import pytest
 from firmware_bridge.lpc1768.build import SOURCES
 from firmware_bridge.lpc1768.elf import ElfImage
 from firmware_bridge.sender.project import readme, write_project
-from gfimu.base.errors import InputError
+from gfimu import InputError
 from tests.firmware_bridge.sender.conftest import BARE, CORE, STRICT
 
 ARM = ("-target", "thumb-freestanding-eabi", "-mthumb", *STRICT, *BARE)

@@ -10,7 +10,7 @@ import pytest
 
 from firmware_bridge.host.recorder import record
 from firmware_bridge.sources import klipper
-from gfimu.base.errors import InputError
+from gfimu import InputError
 from gfimu.recording import Recording
 from tests.firmware_bridge.sources.fake_klippy import FakeKlippy, motion
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from firmware_bridge.host.recorder import record
-from gfimu.base.errors import InputError
+from gfimu import InputError
 from gfimu.recording import Recording
 
 RATE_HZ = 400.0

@@ -13,7 +13,7 @@ from firmware_bridge.frames.decoder import encode_samples, frame_format
 from firmware_bridge.host.finder import find_boards
 from firmware_bridge.host.recorder import record
 from firmware_bridge.sources.udp import UdpSource
-from gfimu.base.errors import InputError
+from gfimu import InputError
 from gfimu.recording import Recording
 
 

@@ -21,7 +21,7 @@ from firmware_bridge.strict.image import load_image
 from firmware_bridge.strict.rules import RULES
 from firmware_bridge.strict.watch import Policy
 from firmware_bridge.strict.worker import run_board
-from gfimu.base.errors import InputError
+from gfimu import InputError
 
 IMAGES = Path(__file__).parents[1] / "images"
 DOCS = Path(__file__).parents[3] / "docs" / "reference" / "firmware.md"

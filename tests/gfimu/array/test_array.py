@@ -5,9 +5,9 @@ import itertools
 import numpy as np
 import pytest
 
-from gfimu.array.array import OMEGA_PRODUCTS, AccelerometerArray
+from gfimu import AccelerometerArray, InputError
+from gfimu.array.array import OMEGA_PRODUCTS
 from gfimu.array.kinematics import ALTERNATE_CORNERS, omega_products
-from gfimu.base.errors import InputError
 from gfimu.base.files.model_files import list_models
 
 SHIPPED = list_models("arrays")

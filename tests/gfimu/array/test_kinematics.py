@@ -7,22 +7,20 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from scipy.spatial.transform import Rotation
 
-from gfimu.array.array import AccelerometerArray, Chip
-from gfimu.array.kinematics import (
+from gfimu import (
+    AccelerometerArray,
+    Chip,
+    GeometryError,
+    InputError,
     closed_form,
-    joint_covariance,
     joint_form,
     motion_from_readings,
     null_space,
-    omega_leakage,
-    omega_products,
     pseudo_inverse,
-    require_all_motions,
     specific_force,
-    unseen_motions,
 )
+from gfimu.array.kinematics import joint_covariance, omega_leakage, omega_products, require_all_motions, unseen_motions
 from gfimu.array.observability import seeing_arrays
-from gfimu.base.errors import GeometryError, InputError
 
 SHIPPED = seeing_arrays()
 CUBES = ("cube12", "cube12_as_built")

@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from gfimu import AccelerometerArray, specific_force
+from gfimu import AccelerometerArray, GeometryError, InputError, specific_force
 from gfimu.array.kinematics import omega_products
 from gfimu.array.linear_solution import linear_solution
-from gfimu.base.errors import GeometryError, InputError
 
 FORM_OF = {
     "cube12": "linear",

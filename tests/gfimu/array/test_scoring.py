@@ -9,11 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from gfimu.array.array import AccelerometerArray, Chip
-from gfimu.array.dilution import gdop, gdop_lower_bound
+from gfimu import AccelerometerArray, Chip, GeometryError, InputError, gdop
+from gfimu.array.dilution import gdop_lower_bound
 from gfimu.array.observability import seeing_arrays
 from gfimu.array_search.scoring import ranking_remark, score
-from gfimu.base.errors import GeometryError, InputError
 
 # Lengths in units of half the cube's edge. κ and GDOP of the tetrahedral cube: GF-IMU paper (1.414, 1.061); the rest
 # from a numerical study of the geometries, to the digits given there. Last column: GDOP of [J Q] (none: inf).
@@ -134,7 +133,7 @@ def test_length_unit_changes_the_figures_as_it_must():
 
 
 def test_sigma_is_the_scatter_of_the_solution():
-    from gfimu.array.kinematics import motion_from_readings
+    from gfimu import motion_from_readings
 
     array = AccelerometerArray.load("mimu4444")
     noise = np.random.default_rng(5).normal(size=(40_000, array.n_channels))

@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-from gfimu.array.array import AccelerometerArray
+from gfimu import AccelerometerArray, GeometryError, InputError
 from gfimu.array.dilution import gdop_lower_bound
 from gfimu.array_search.scoring import score
 from gfimu.array_search.search import optimize
-from gfimu.base.errors import GeometryError, InputError
 
 
 def search(n_chips, seed=1, restarts=12, **options):

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from gfimu import GeometryError
 from gfimu.array_search.certificate import certify
 from gfimu.array_search.objectives import Conditions, objective
 from gfimu.array_search.problem import Problem, Sites
 from gfimu.array_search.shapes import box, cylinder, sphere
-from gfimu.base.errors import GeometryError
 
 CUBE, BALL, CAN = box((0.1, 0.1, 0.1)), sphere(0.05), cylinder(0.05, 0.08)
 

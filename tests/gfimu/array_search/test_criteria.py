@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import approx_fprime
 
-from gfimu.array.array import AccelerometerArray
+from gfimu import AccelerometerArray, SensorErrors, drift_budget, rate_bound
 from gfimu.array_search.criteria import Goal
 from gfimu.array_search.exchange import drawn_rows, log_figure
 from gfimu.array_search.objectives import OBJECTIVES, Conditions, objective
@@ -14,10 +14,8 @@ from gfimu.array_search.polish import _objective, _Variables, alpha_leakage, lea
 from gfimu.array_search.problem import Design, Problem, Tolerance, rows_of, slopes_by_design
 from gfimu.array_search.scoring import score
 from gfimu.array_search.shapes import box, frames_across
-from gfimu.budget.drift import drift_budget
-from gfimu.rate.bounds.sample import alpha_std, rate_bound
+from gfimu.rate.bounds.sample import alpha_std
 from gfimu.rate.health.detectable import detectable_faults
-from gfimu.rate.sensing import SensorErrors
 
 CUBE = box((0.1, 0.1, 0.1))
 

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from gfimu import InputError
 from gfimu.array_search.front import find_front
 from gfimu.array_search.objectives import Conditions, objective
 from gfimu.array_search.problem import Problem, Sites, Tolerance
 from gfimu.array_search.search import search
 from gfimu.array_search.shapes import box
-from gfimu.base.errors import InputError
 
 CUBE = box((0.1, 0.1, 0.1))
 

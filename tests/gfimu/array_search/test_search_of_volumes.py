@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from gfimu import GeometryError, InputError
 from gfimu.array_search.objectives import Conditions, objective
 from gfimu.array_search.problem import Problem, Sites, Tolerance
 from gfimu.array_search.search import search
 from gfimu.array_search.shapes import box, cylinder, sphere
-from gfimu.base.errors import GeometryError, InputError
 
 CUBE = box((0.1, 0.1, 0.1))
 CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * 0.05

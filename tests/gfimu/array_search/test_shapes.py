@@ -5,8 +5,8 @@ import pytest
 from scipy.optimize import approx_fprime
 from scipy.spatial import Delaunay
 
+from gfimu import InputError
 from gfimu.array_search.shapes import box, cylinder, sphere
-from gfimu.base.errors import InputError
 
 CENTRE = np.array([0.01, -0.02, 0.03])
 SHAPES = {

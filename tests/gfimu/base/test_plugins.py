@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import gfimu
+from gfimu import InputError
 from gfimu.base import plugins as loading
-from gfimu.base.errors import InputError
 from gfimu.base.plugins import GROUPS, plugins, user_function
 from gfimu.rate.registry import RateMethod, rate_method
 from gfimu.recording.formats import formats

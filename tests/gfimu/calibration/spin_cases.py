@@ -4,8 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gfimu.array.array import AccelerometerArray
-from gfimu.array.kinematics import specific_force
+from gfimu import AccelerometerArray, specific_force
 from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.calibration.methods import calibrate
 from gfimu.calibration.spin import SpinPolicy, spin

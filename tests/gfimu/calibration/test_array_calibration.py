@@ -9,10 +9,7 @@ from recordings import pose_recording
 from scipy.spatial.transform import Rotation
 
 import gfimu.calibration.array_motion as array_motion_module
-from gfimu.array.array import AccelerometerArray
-from gfimu.array.kinematics import specific_force
-from gfimu.base.errors import InputError, UnitError
-from gfimu.calibration.array_calibration import calibrate_array
+from gfimu import AccelerometerArray, InputError, UnitError, calibrate_array, read_mimu4444, specific_force
 from gfimu.calibration.array_motion import array_motion
 from gfimu.calibration.array_static import apparent_alpha, array_static, body_specific_force, disagreement
 from gfimu.calibration.array_update import array_update
@@ -21,7 +18,6 @@ from gfimu.calibration.faults import without_moved_poses
 from gfimu.calibration.motion_reference import motion_reference
 from gfimu.calibration.observations import averaged_poses
 from gfimu.recording import Recording
-from gfimu.recording.mimu4444 import read_mimu4444
 from gfimu.recording.rest import detect_rest
 
 

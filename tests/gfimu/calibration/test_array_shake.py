@@ -7,17 +7,13 @@ import pytest
 from calibration_cases import GRAVITY, MULTI, chips_in_gauge, poses_of
 from scipy.interpolate import CubicSpline
 
-from gfimu.array.array import AccelerometerArray
-from gfimu.array.kinematics import specific_force
-from gfimu.base.errors import InputError
-from gfimu.calibration.array_calibration import calibrate_array
+from gfimu import AccelerometerArray, InputError, calibrate_array, read_mimu4444, specific_force
 from gfimu.calibration.array_shake import array_shake
 from gfimu.calibration.array_static import array_static
 from gfimu.calibration.shake_equations import RateSpline
 from gfimu.calibration.shake_scale import scale_from_band
 from gfimu.calibration.shake_start import Shake, shakes
 from gfimu.recording import Recording
-from gfimu.recording.mimu4444 import read_mimu4444
 from gfimu.recording.rest import Rest
 
 CUBE = AccelerometerArray.load("cube12")

@@ -7,9 +7,7 @@ import pytest
 from calibration_cases import CORNERS, EDGES, FACES, GRAVITY, MULTI, assert_honest, chips_in_gauge, poses_of
 from recordings import pose_recording
 
-from gfimu.array.array import AccelerometerArray
-from gfimu.base.errors import InputError, UnitError
-from gfimu.calibration.array_calibration import calibrate_array, update_array_calibration
+from gfimu import AccelerometerArray, InputError, UnitError, calibrate_array, update_array_calibration
 from gfimu.calibration.array_static import apparent_alpha, array_static, body_specific_force
 from gfimu.calibration.array_update import array_update
 from gfimu.calibration.error_model import ErrorModel

@@ -9,7 +9,7 @@ from calibration_cases import GRAVITY, MULTI
 from every_item import every
 from recordings import pose_recording
 
-from gfimu.base.errors import InputError
+from gfimu import InputError
 from gfimu.calibration.error_model import GAUGES
 from gfimu.calibration.methods import CalibrationTask, calibrate, run_calibration
 from gfimu.calibration.registry import METHODS, CalibrationMethod, calibration_method

@@ -6,11 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gfimu.array.array import AccelerometerArray
-from gfimu.base.errors import InputError, UnitError
+from gfimu import AccelerometerArray, Calibration, InputError, UnitError, load_calibration
 from gfimu.calibration.combine import combine
 from gfimu.calibration.parameter_names import parameter_names
-from gfimu.calibration.result import Calibration, load_calibration
 from gfimu.calibration.run_file import open_calibrated_run
 from gfimu.recording import Recording
 from gfimu.recording.carried_array import array_difference

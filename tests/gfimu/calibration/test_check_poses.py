@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import gfimu
-from gfimu.base.errors import InputError
+from gfimu import InputError
 from gfimu.calibration.check_poses import check_on_poses
 from gfimu.calibration.error_model import ErrorModel
 from gfimu.recording import Recording

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from gfimu.base.errors import InputError
+from gfimu import InputError
 from gfimu.calibration.error_model import ErrorModel, free_elements
 
 matrices = st.lists(st.floats(-0.2, 0.2), min_size=9, max_size=9).map(

@@ -7,7 +7,7 @@ import pytest
 from calibration_cases import FACES, GRAVITY, MULTI
 from recordings import pose_recording
 
-from gfimu.base.errors import InputError
+from gfimu import InputError
 from gfimu.calibration.methods import METHODS, calibrate, calibrate_gyro
 from gfimu.calibration.observations import averaged_poses, denoised_samples, every_sample, observations_from
 from gfimu.recording import Recording

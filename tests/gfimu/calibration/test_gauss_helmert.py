@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gfimu.base.errors import InputError
+from gfimu import InputError
 from gfimu.calibration.gauss_helmert import gauss_helmert
 
 # P. T. Boggs, R. H. Byrd, J. E. Rogers and R. B. Schnabel, "User's Reference Guide for ODRPACK Version 2.01", p. 49:

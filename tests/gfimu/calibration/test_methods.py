@@ -5,7 +5,7 @@ import pytest
 from calibration_cases import EDGES, FACES, GRAVITY, MULTI, TWELVE, simulate
 from scipy.optimize import least_squares
 
-from gfimu.base.errors import InputError
+from gfimu import InputError
 from gfimu.calibration.error_model import ErrorModel
 from gfimu.calibration.gauss_helmert import gauss_helmert
 from gfimu.calibration.multi_position import magnitude_condition, multi_position

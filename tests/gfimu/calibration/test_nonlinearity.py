@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from calibration_cases import GRAVITY, MULTI, chips_in_gauge, poses_of, simulate
 
-from gfimu.array.array import AccelerometerArray
+from gfimu import AccelerometerArray
 from gfimu.calibration.array_static import array_static, bias_places, same_specific_force
 from gfimu.calibration.error_model import ErrorModel
 from gfimu.calibration.fit_quality import covariance_scale, mean_factor

@@ -7,12 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gfimu import AccelerometerArray, Recording
-from gfimu.array.array import Chip
+from gfimu import AccelerometerArray, Calibration, Chip, Recording
 from gfimu.base.results.colours import chip_colour, css
 from gfimu.calibration.parameter_names import parameter_names
 from gfimu.calibration.pictures import calibration_figure, pose_names
-from gfimu.calibration.result import Calibration
 
 FACES = np.concatenate([np.eye(3), -np.eye(3)])
 EDGES = np.array([[1.0, 1.0, 0.0], [0.0, 1.0, -1.0], [-1.0, 0.0, 1.0]]) / np.sqrt(2)

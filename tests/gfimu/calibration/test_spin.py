@@ -7,11 +7,10 @@ import pytest
 import spin_cases
 from spin_cases import CUBE, ON_ITS_SIDE, Unit, normalised_errors
 
-from gfimu.base.errors import InputError, UnitError
+from gfimu import Calibration, InputError, UnitError, load_calibration
 from gfimu.calibration.certificate.certify import certify
 from gfimu.calibration.error_model import ErrorModel
 from gfimu.calibration.nonlinearity import cubic_std
-from gfimu.calibration.result import Calibration, load_calibration
 from gfimu.calibration.spin import SpinPolicy, spin
 from gfimu.calibration.spin.model import Geometry, SpinGeometry, read_plateaus
 from gfimu.calibration.spin.plateaus import find_plateaus

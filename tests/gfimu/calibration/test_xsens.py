@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gfimu.base.errors import InputError
+from gfimu import InputError
 from gfimu.calibration.imu_tk import read_text_triad
 from gfimu.calibration.methods import calibrate
 from gfimu.calibration.multi_position import multi_position

@@ -7,7 +7,7 @@ import pyarrow.parquet as pq
 import pytest
 
 import gfimu
-from gfimu.base.errors import InputError
+from gfimu import InputError
 from sim.rigs.driven import drive
 from sim.scenarios import Scenario
 from sim.trials.campaign.drive import DriveWork

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from gfimu import AccelerometerArray
-from gfimu.base.errors import InputError
+from gfimu import AccelerometerArray, InputError
 from sim.scenarios import Scenario
 from sim.trials.campaign.cases import estimate_case
 from sim.trials.campaign.effects import drawn_effects, names_effect

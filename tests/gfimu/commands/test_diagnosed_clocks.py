@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import gfimu
+from gfimu import Diagnosis, NamedCause
 from gfimu.diagnosis.criticism.gain import Gain
-from gfimu.diagnosis.verdict.parts import NamedCause, NoiseLevels, Residual, Unexplained
-from gfimu.diagnosis.verdict.verdict import Diagnosis
+from gfimu.diagnosis.verdict.parts import NoiseLevels, Residual, Unexplained
 from gfimu.recording.joining import ReferenceSeries
 from sim.trials.worlds.hidden import Measurement, measure
 from sim.twin import Twin

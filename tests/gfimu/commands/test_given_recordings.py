@@ -5,7 +5,7 @@ import pyarrow as pa
 import pytest
 
 import gfimu
-from gfimu.base.errors import CorruptValueWarning, InputError, UnitError
+from gfimu import CorruptValueWarning, InputError, UnitError
 from gfimu.commands.opened import as_runs, as_source
 
 CUBE = gfimu.AccelerometerArray.load("cube12")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gfimu.array.array import AccelerometerArray
+from gfimu import AccelerometerArray
 from gfimu.diagnosis import diagnose
 from gfimu.diagnosis.criticism import holdout
 from gfimu.diagnosis.data.stretch import make_stretches

@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
-from gfimu.base.errors import InputError
+from gfimu import InputError
 from gfimu.base.files.model_files import find_model, read_toml
+from gfimu.diagnosis import diagnose
 from gfimu.diagnosis.data.body.run import prepare_body_run
 from gfimu.diagnosis.data.body.stretch import make_body_stretches
-from gfimu.diagnosis.diagnose import diagnose, prepare
+from gfimu.diagnosis.diagnose import prepare
 from gfimu.diagnosis.report.picture import write_picture
 from gfimu.diagnosis.terms.hand.drive import HandDrive
 from gfimu.motion.attitude import to_rotation

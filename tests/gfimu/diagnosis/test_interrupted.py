@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 import gfimu
-from gfimu.array.array import AccelerometerArray
-from gfimu.base.errors import InputError
+from gfimu import AccelerometerArray, InputError
 from gfimu.diagnosis import diagnose
 from gfimu.diagnosis.report.plain_words import headline, next_steps
 from gfimu.diagnosis.time_limit import limited_to

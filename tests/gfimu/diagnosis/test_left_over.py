@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from usual_twin import UsualTwin
 
-from gfimu.array.array import AccelerometerArray
+from gfimu import AccelerometerArray
 from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.diagnosis import diagnose
 from gfimu.diagnosis.criticism.series_tests import lines

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import gfimu
-from gfimu.base.errors import InputError
+from gfimu import InputError
 from gfimu.diagnosis.design.run_check import check_runs
 from gfimu.diagnosis.diagnose import prepare
 from gfimu.diagnosis.fit.learn import starting_point

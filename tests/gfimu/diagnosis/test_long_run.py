@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from usual_twin import UsualTwin
 
-from gfimu.array.array import AccelerometerArray
+from gfimu import AccelerometerArray
 from gfimu.diagnosis import diagnose
 from gfimu.diagnosis.data import stretch
 from gfimu.diagnosis.data.run import prepare_run

@@ -9,14 +9,12 @@ import pytest
 from made_diagnoses import made_diagnosis
 from usual_twin import UsualTwin
 
-from gfimu.array.array import AccelerometerArray
-from gfimu.base.errors import InputError
+from gfimu import AccelerometerArray, InputError, NamedCause
 from gfimu.diagnosis import diagnose
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.report.page import report_html
 from gfimu.diagnosis.report.plain_words import headline
 from gfimu.diagnosis.verdict.naming import capped
-from gfimu.diagnosis.verdict.parts import NamedCause
 from gfimu.diagnosis.verdict.wording import verdict_sentences
 from gfimu.recording import Recording
 from sim.effects import make_effect

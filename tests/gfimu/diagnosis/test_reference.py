@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from gfimu.array.array import AccelerometerArray
-from gfimu.base.errors import InputError
+from gfimu import AccelerometerArray, InputError
 from gfimu.diagnosis import diagnose
 from gfimu.diagnosis.data.run import prepare_run
 from gfimu.recording import Recording

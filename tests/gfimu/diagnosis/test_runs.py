@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from gfimu.array.array import AccelerometerArray
+from gfimu import AccelerometerArray
 from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.diagnosis import diagnose
 from gfimu.diagnosis.criticism.holdout import split

@@ -7,7 +7,7 @@ late.
 import numpy as np
 import pytest
 
-from gfimu.array.array import AccelerometerArray
+from gfimu import AccelerometerArray
 from gfimu.diagnosis import diagnose
 from sim.effects import make_effect
 from sim.motions.motion import SpinState, SplineSpin

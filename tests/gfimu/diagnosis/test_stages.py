@@ -7,9 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from gfimu.array.array import AccelerometerArray
+from gfimu import AccelerometerArray, NamedCause
 from gfimu.diagnosis import diagnose
-from gfimu.diagnosis.verdict.parts import NamedCause
 from sim.trials.worlds.hidden import Measurement, measure
 from sim.twin import Twin
 

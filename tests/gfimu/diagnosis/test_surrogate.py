@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from usual_twin import UsualTwin
 
-from gfimu.array.array import AccelerometerArray
-from gfimu.base.errors import InputError
+from gfimu import AccelerometerArray, InputError
 from gfimu.diagnosis import diagnose
 from gfimu.diagnosis.report.folder import write_diagnosis
 from gfimu.diagnosis.report.plain_words import story

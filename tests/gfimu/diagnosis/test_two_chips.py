@@ -11,19 +11,18 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
 
-from gfimu.array.array import AccelerometerArray, Chip
-from gfimu.base.errors import InputError
+from gfimu import AccelerometerArray, Chip, InputError, NamedCause
 from gfimu.base.units import STANDARD_GRAVITY
+from gfimu.diagnosis import diagnose
 from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.data.body.run import prepare_body_run
 from gfimu.diagnosis.data.body.stretch import make_body_stretches
-from gfimu.diagnosis.diagnose import diagnose
 from gfimu.diagnosis.terms.hand.drive import HandDrive
 from gfimu.diagnosis.terms.hand.learning import first_noise
 from gfimu.diagnosis.terms.hand.noise import Projection
 from gfimu.diagnosis.terms.hand.posterior import condition_hand
 from gfimu.diagnosis.verdict.gate import impossible_sizes, judge
-from gfimu.diagnosis.verdict.parts import NamedCause, Residual
+from gfimu.diagnosis.verdict.parts import Residual
 from gfimu.motion.body_drive import BodyDrive
 from gfimu.recording import Recording
 from sim.effects import make_effect

@@ -7,15 +7,8 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from gfimu.base.errors import InputError
-from gfimu.motion.attitude import (
-    ATTITUDE_METHODS,
-    from_rotation,
-    integrate_attitude,
-    table_angle,
-    to_rotation,
-    twist_angle,
-)
+from gfimu import InputError, integrate_attitude
+from gfimu.motion.attitude import ATTITUDE_METHODS, from_rotation, table_angle, to_rotation, twist_angle
 
 vectors = st.lists(st.floats(-20, 20), min_size=3, max_size=3).map(np.array)
 

@@ -5,10 +5,9 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
+from gfimu import EarthRotation, InputError
 from gfimu.array.gravity import EARTH_RATE
-from gfimu.base.errors import InputError
 from gfimu.motion.attitude import from_rotation, to_rotation
-from gfimu.motion.earth import EarthRotation
 
 EARTH = EarthRotation(35.0, 0.7)
 

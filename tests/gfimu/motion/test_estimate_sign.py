@@ -7,9 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gfimu import AccelerometerArray, Recording, specific_force, summarise
+from gfimu import AccelerometerArray, Estimate, Recording, specific_force, summarise
 from gfimu.array.parts.limits import PartLimits
-from gfimu.motion.estimate import Estimate
 from gfimu.motion.estimation import estimate
 from gfimu.visual.run_plots import free_rate_plots
 

@@ -7,13 +7,23 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import gfimu
-from gfimu import AccelerometerArray, Chip, Estimate, InputError, Recording, estimate, specific_force, summarise
+from gfimu import (
+    AccelerometerArray,
+    Chip,
+    Estimate,
+    GeometryError,
+    InputError,
+    Recording,
+    centripetal_agreement,
+    estimate,
+    integrate_attitude,
+    specific_force,
+    summarise,
+)
 from gfimu.array.kinematics import omega_products
 from gfimu.array.parts.part import white_noise_std
-from gfimu.base.errors import GeometryError
 from gfimu.base.units import STANDARD_GRAVITY
-from gfimu.motion.attitude import integrate_attitude, to_rotation
-from gfimu.motion.estimate_summary import centripetal_agreement
+from gfimu.motion.attitude import to_rotation
 
 CUBE = AccelerometerArray.load("cube12")
 

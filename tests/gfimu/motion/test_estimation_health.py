@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 
 import gfimu
-from gfimu.array.array import AccelerometerArray
-from gfimu.base.errors import InputError
-from gfimu.motion.estimate import Estimate
+from gfimu import AccelerometerArray, Estimate, InputError
 from gfimu.rate.health.fault import HealthCode
 
 

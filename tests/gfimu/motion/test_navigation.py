@@ -6,9 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from gfimu.base.errors import InputError
-from gfimu.motion.attitude import from_rotation, integrate_attitude, to_rotation
-from gfimu.motion.navigation import level, navigate
+from gfimu import InputError, integrate_attitude, level, navigate
+from gfimu.motion.attitude import from_rotation, to_rotation
 
 G = 9.80665
 

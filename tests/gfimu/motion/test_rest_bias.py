@@ -8,8 +8,8 @@ from numpy.testing import assert_allclose
 from scipy.integrate import cumulative_trapezoid
 from scipy.spatial.transform import Rotation
 
-from gfimu import AccelerometerArray, InputError, Recording, specific_force
-from gfimu.motion.rest_bias import RestBias, estimate_from_rest, force_at_rest, rest_bias
+from gfimu import AccelerometerArray, InputError, Recording, estimate_from_rest, specific_force
+from gfimu.motion.rest_bias import RestBias, force_at_rest, rest_bias
 
 ARRAY = AccelerometerArray.load("cube12")
 BIAS = np.linspace(-0.5, 0.4, 12)

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from gfimu.base.errors import InputError
+from gfimu import InputError, navigate
 from gfimu.motion.attitude import from_rotation, to_rotation
-from gfimu.motion.navigation import navigate
 from gfimu.motion.rest_navigation import navigate_with_rest
 
 G = 9.80665

@@ -8,11 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from gfimu.array.array import AccelerometerArray, Chip
-from gfimu.rate.bounds.posterior import posterior_rate_bound
+from gfimu import AccelerometerArray, Chip, SensorErrors, posterior_rate_bound
 from gfimu.rate.filter import filter_rate
 from gfimu.rate.rest_test import RestTest
-from gfimu.rate.sensing import SensorErrors
 from gfimu.rate.smoother import smooth_rate
 
 GRAVITY = 9.80665

@@ -7,10 +7,9 @@ import pytest
 from rate_worlds import cube, measure, sensor_errors, tumble
 from scipy.stats import chi2
 
-from gfimu import AccelerometerArray, Recording, specific_force, summarise
+from gfimu import AccelerometerArray, Recording, estimate_from_rest, specific_force, summarise
 from gfimu.array.parts.limits import PartLimits
 from gfimu.base.units import STANDARD_GRAVITY
-from gfimu.motion.rest_bias import estimate_from_rest
 from gfimu.rate.consistency import FALSE_ALARM, _slow_quantile, judge_consistency, slow_error_signatures
 from gfimu.rate.filter import filter_rate
 from sim.scenarios import Scenario

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 from rate_worlds import measure, sensor_errors, tumble
 
-from gfimu.array.array import AccelerometerArray
+from gfimu import AccelerometerArray, LiveRateFilter
 from gfimu.rate.kalman import FilterSettings
-from gfimu.rate.live import LiveRateFilter
 from gfimu.rate.stream import filter_stream
 
 RATE = 100.0

@@ -15,7 +15,7 @@ import rate_worlds
 from rate_worlds import cube, first_rest, measure, rms, sensor_errors, study, tumble, turntable
 from scipy.stats import chi2
 
-from gfimu.rate.bounds.posterior import posterior_rate_bound
+from gfimu import posterior_rate_bound
 from gfimu.rate.filter import filter_rate
 from gfimu.rate.kalman import FilterSettings
 

@@ -9,18 +9,16 @@ import pytest
 from rate_worlds import cube, measure, readings, sensor_errors, tumble, turntable
 from reference_filter import reference_filter, reference_smoother
 
-from gfimu.array.array import AccelerometerArray
+from gfimu import AccelerometerArray, GeometryError, InputError, LiveRateFilter, SensorErrors, estimate_rate
 from gfimu.array.quadrature import even_weights
-from gfimu.base.errors import GeometryError, InputError
 from gfimu.rate.backward import backward
 from gfimu.rate.disagreement import MeasuredNoise
 from gfimu.rate.filter import filter_rate
 from gfimu.rate.kalman import FilterSettings
-from gfimu.rate.live import LiveRateFilter
-from gfimu.rate.methods import RATE_METHODS, estimate_rate
+from gfimu.rate.methods import RATE_METHODS
 from gfimu.rate.preparation import prepare
 from gfimu.rate.recursion import forward
-from gfimu.rate.sensing import ChannelTables, SensorErrors
+from gfimu.rate.sensing import ChannelTables
 from gfimu.rate.smoother import smooth_rate
 
 CUBE = cube()

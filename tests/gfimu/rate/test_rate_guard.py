@@ -12,15 +12,12 @@ import pytest
 from rate_worlds import Motion, cube, measure, sensor_errors, tumble
 
 import gfimu
-from gfimu import AccelerometerArray, Recording, SensorErrors
+from gfimu import AccelerometerArray, LiveRateFilter, Recording, SensorErrors, estimate_rate, summarise
 from gfimu.array.kinematics import omega_products
 from gfimu.array.parts.part import white_noise_std
-from gfimu.motion.estimate_summary import summarise
 from gfimu.rate.filter import filter_rate
 from gfimu.rate.guard import Guard
 from gfimu.rate.kalman import FilterSettings, KalmanRateFilter, join
-from gfimu.rate.live import LiveRateFilter
-from gfimu.rate.methods import estimate_rate
 from gfimu.rate.rest_test import shown_variance
 from gfimu.rate.sensing import ChannelTables
 from gfimu.rate.smoother import smooth_rate

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gfimu.array.integration import METHODS, integrate_rate, integrate_samples
+from gfimu import InputError, integrate_rate
+from gfimu.array.integration import METHODS, integrate_samples
 from gfimu.array.quadrature import STENCILS, even_weights, polynomial_weights
-from gfimu.base.errors import InputError
 from gfimu.rate.kalman import QUADRATURES
 
 DEGREE = {"trapezoid": 1, "runge_kutta": 2, "adams_moulton4": 3, "centred4": 3, "centred6": 5}

@@ -10,14 +10,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gfimu.array.array import AccelerometerArray
-from gfimu.calibration.array_calibration import calibrate_array
+from gfimu import AccelerometerArray, SensorErrors, calibrate_array, estimate_rate, read_mimu4444
 from gfimu.rate.filter import filter_rate
 from gfimu.rate.kalman import FilterSettings
-from gfimu.rate.methods import estimate_rate
-from gfimu.rate.sensing import SensorErrors
 from gfimu.rate.smoother import smooth_rate
-from gfimu.recording.mimu4444 import read_mimu4444
 
 DARK = FilterSettings(start_omega=None)
 START_S = 550.0  # amid the motion of recording 2

@@ -8,14 +8,18 @@ import numpy as np
 import pytest
 
 import gfimu
-from gfimu import AccelerometerArray, Recording, specific_force
-from gfimu.base.errors import InputError
+from gfimu import (
+    AccelerometerArray,
+    InputError,
+    Recording,
+    SensorErrors,
+    estimate_from_rest,
+    estimate_rate,
+    specific_force,
+)
 from gfimu.motion.estimation import estimate
-from gfimu.motion.rest_bias import estimate_from_rest
 from gfimu.rate import registry
-from gfimu.rate.methods import estimate_rate
 from gfimu.rate.registry import RATE_METHODS, RateMethod, rate_method
-from gfimu.rate.sensing import SensorErrors
 
 CUBE = AccelerometerArray.load("cube12")
 

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from rate_worlds import GRAVITY, Motion, cube, measure, sensor_errors, smooth_step, total_noise_std, turntable
 
-from gfimu.base.errors import InputError
+from gfimu import InputError, LiveRateFilter
 from gfimu.rate.filter import filter_rate
 from gfimu.rate.kalman import FilterSettings
-from gfimu.rate.live import LiveRateFilter
 from gfimu.rate.rest_test import RestTest, constant_readings
 from gfimu.rate.sensing import ChannelTables
 from gfimu.rate.smoother import smooth_rate

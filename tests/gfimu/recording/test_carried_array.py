@@ -7,11 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gfimu import AccelerometerArray, InputError, Recording
+from gfimu import AccelerometerArray, InputError, Recording, SensorErrors
 from gfimu.array.parts.limits import PartLimits
 from gfimu.array.parts.part import Part, white_noise_std
 from gfimu.calibration.run_file import open_uncalibrated
-from gfimu.rate.sensing import SensorErrors
 from gfimu.recording.carried_array import array_difference
 from gfimu.recording.formats import open_run
 from sim.chips.data_sheet import DataSheet

@@ -6,9 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gfimu import AccelerometerArray, InputError, Recording, estimate
+from gfimu import AccelerometerArray, CorruptValueWarning, InputError, Recording, estimate
 from gfimu.array.parts.plausible import largest_of_array, largest_of_part
-from gfimu.base.errors import CorruptValueWarning
 from gfimu.recording.formats import open_run
 
 CUBE = AccelerometerArray.load("cube12")

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 import gfimu
-from gfimu import AccelerometerArray, InputError, Recording
-from gfimu.base.errors import RecordingWarning
+from gfimu import AccelerometerArray, InputError, MappedFile, Recording, RecordingWarning
 from gfimu.recording.formats import open_run
 from gfimu.recording.importing.clock import increasing_times
-from gfimu.recording.mapped import MappedFile, mapped_recording
+from gfimu.recording.mapped import mapped_recording
 
 CUBE = AccelerometerArray.load("cube12")
 N = 500
@@ -118,8 +117,8 @@ def test_raw_counts_stay_counts(clean, tmp_path):
     clean.write(tmp_path / "run.csv")
     path = tmp_path / "raw.csv"
     path.write_text((tmp_path / "run.csv").read_text().replace("_m_s2", "_lsb"))
+    from gfimu import load_map
     from gfimu.calibration.run_file import open_uncalibrated
-    from gfimu.recording.importing import load_map
 
     raw = open_uncalibrated(MappedFile(path, load_map(None, ["time.start_s=1"])))
     assert raw.unit == "lsb"
@@ -133,7 +132,7 @@ def test_a_foreign_file_and_a_table_are_filtered_as_well(clean, tmp_path):
     columns["a12"][50], columns["a13"][60] = 1e19, np.nan
     table = pa.table({"time": clean.t_s, **columns})
     names = [f"channels.{name}={name}" for name in clean.channels]
-    from gfimu.recording.importing import load_map
+    from gfimu import load_map
 
     chosen = load_map(None, ["time.column=time", "unit=m/s^2", *names, "drop=corrupt,missing"])
     with pytest.warns(RecordingWarning):
@@ -156,7 +155,7 @@ def test_a_range_that_is_not_known_is_said(tmp_path):
 
 
 def test_the_array_of_a_filtered_recording_is_its_own(clean, tmp_path):
-    from gfimu.recording.importing import load_map
+    from gfimu import load_map
 
     path = written(clean, tmp_path / "run.csv", TWICE)
     with pytest.warns(RecordingWarning):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from gfimu.array.array import AccelerometerArray, Chip
+from gfimu import AccelerometerArray, Chip
 from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.recording import Recording
 from gfimu.recording.checks import check_recording

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gfimu.array.array import AccelerometerArray
+from gfimu import AccelerometerArray
 from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.recording.checks import check_recording
 from sim.scenarios import Scenario

@@ -13,8 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from gfimu import AccelerometerArray, InputError, Recording
-from gfimu.base.errors import UnitError
+from gfimu import AccelerometerArray, InputError, Recording, UnitError
 from gfimu.base.units import STANDARD_GRAVITY
 
 CUBE = AccelerometerArray.load("cube12")

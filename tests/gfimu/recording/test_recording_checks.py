@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from gfimu import AccelerometerArray, InputError, Recording, estimate, specific_force
+from gfimu import AccelerometerArray, InputError, Recording, estimate, estimate_from_rest, specific_force
 from gfimu.array.parts.limits import PartLimits
 from gfimu.base.files.model_files import list_models
 from gfimu.base.units import STANDARD_GRAVITY
-from gfimu.motion.rest_bias import estimate_from_rest
 from gfimu.recording.checks import check_recording, refuse_or_warn
 from gfimu.recording.formats import open_run
 from sim.scenarios import Scenario

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gfimu.array.array import AccelerometerArray
+from gfimu import AccelerometerArray
 from gfimu.diagnosis.data.run import prepare_run
 from gfimu.diagnosis.data.stretch import make_stretches, moved
 from gfimu.diagnosis.fit.learn import starting_point

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gfimu.base.errors import InputError
+from gfimu import InputError
 from gfimu.recording import Recording
 from gfimu.recording.rest import detect_rest, motion_statistic
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import gfimu
-from gfimu.base.errors import InputError
+from gfimu import InputError
 from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.recording.checks import check_recording
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gfimu.base.errors import InputError
+from gfimu import InputError
 from gfimu.sensor_noise.innovations import add_noise, flicker_shape
 from sim.trials.worlds.hidden import bias_instability
 

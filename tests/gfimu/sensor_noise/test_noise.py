@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gfimu.base.errors import InputError, UnitError
+from gfimu import InputError, UnitError
 from gfimu.recording import Recording
 from gfimu.sensor_noise import (
     allan_deviation,

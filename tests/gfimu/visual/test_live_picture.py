@@ -13,8 +13,7 @@ from firmware_bridge.frames.decoder import StreamCounts
 from firmware_bridge.host import live
 from firmware_bridge.host.live import LiveView
 from firmware_bridge.host.recorder import Batch
-from gfimu import AccelerometerArray
-from gfimu.array.kinematics import specific_force
+from gfimu import AccelerometerArray, specific_force
 from gfimu.base.results.colours import HEALTH, chip_colour
 from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.rate.health.fault import HealthCode

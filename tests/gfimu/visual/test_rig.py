@@ -7,10 +7,9 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
-from gfimu import AccelerometerArray
-from gfimu.array.array import Chip
-from gfimu.array.turning_axis import TurningAxis
+from gfimu import AccelerometerArray, Chip, TurningAxis
 from gfimu.base.results.colours import chip_colour
+from gfimu.visual import Box, Cylinder, Names, Pointers
 from gfimu.visual.rig import (
     array_shapes,
     axis_shapes,
@@ -25,7 +24,6 @@ from gfimu.visual.rig import (
 )
 from gfimu.visual.rig.figure import array_figure
 from gfimu.visual.rig.words import array_words, package_words, run_legend
-from gfimu.visual.scene import Box, Cylinder, Names, Pointers
 
 
 def made(places, axes=None, **more) -> AccelerometerArray:

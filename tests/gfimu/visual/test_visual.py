@@ -15,9 +15,7 @@ from rerun_layout import Layout
 from scipy.spatial.transform import Rotation
 
 import gfimu
-from gfimu import AccelerometerArray, InputError, Recording, specific_force
-from gfimu.array.array import Chip
-from gfimu.array.turning_axis import TurningAxis
+from gfimu import AccelerometerArray, Chip, InputError, Recording, TurningAxis, specific_force
 from gfimu.rate.health.fault import HealthCode
 from gfimu.recording.formats import open_run
 from gfimu.visual import Box, Cylinder, ExpectedDrift, KnownMotion, Line, Mesh, Plot, write_comparison, write_run

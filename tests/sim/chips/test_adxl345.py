@@ -11,8 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gfimu.array.array import AccelerometerArray
-from gfimu.base.errors import InputError
+from gfimu import AccelerometerArray, InputError
 from sim.chips.adxl345 import Sensor, SensorErrors, SensorSettings, conversion_offsets, draw_errors, flicker, quantise
 from sim.chips.data_sheet import DataSheet
 

@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gfimu.array.array import AccelerometerArray
+from gfimu import AccelerometerArray, InputError
 from gfimu.array.parts.part import white_noise_std
-from gfimu.base.errors import InputError
 from sim.chips.adxl345 import Sensor, SensorSettings
 from sim.chips.conversions import conversion_groups
 from sim.ride import Ride

@@ -8,7 +8,7 @@ import pytest
 from scipy.signal import lsim
 from scipy.spatial.transform import Rotation
 
-from gfimu.array.array import AccelerometerArray
+from gfimu import AccelerometerArray
 from gfimu.model.generic_basis import Motion, basis_function
 from gfimu.motion.body_drive import BodyDrive
 from sim import forward

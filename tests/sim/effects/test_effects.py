@@ -14,8 +14,7 @@ from every_item import every
 from scipy.interpolate import CubicSpline
 from scipy.signal import lsim, lti
 
-from gfimu.array.array import AccelerometerArray
-from gfimu.base.errors import InputError
+from gfimu import AccelerometerArray, InputError
 from sim import forward
 from sim.effects import EFFECTS, Effect, apply_effects, make_effect
 from sim.effects.low_pass import low_pass, mass_on_spring

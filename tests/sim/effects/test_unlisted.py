@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lsim, lti
 
-from gfimu.array.array import AccelerometerArray
-from gfimu.base.errors import InputError
+from gfimu import AccelerometerArray, InputError
 from gfimu.base.files.model_files import find_model
 from sim import forward
 from sim.effects import EFFECTS, FURTHER_EFFECTS, make_effect

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import gfimu
-from gfimu.base.errors import InputError
+from gfimu import InputError
 from gfimu.rate.axis.axis_gyro import with_axis_gyro
 from sim.motions.carried import Hand, Wheel
 from sim.motions.profiles import Hold, Ramp, spin_profile

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from gfimu.base.errors import InputError
+from gfimu import InputError
 from sim.motions.pose_sequence import POSE_SETS, PoseSequence
 from sim.scenarios import Scenario
 from sim.simulation import simulate

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gfimu.base.errors import InputError
+from gfimu import InputError
 from sim.motions.profiles import Chirp, Hold, Ramp, Sine, Tumble, paper_run, speed_sweep, spin_profile
 
 

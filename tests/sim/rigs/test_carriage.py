@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import gfimu
-from gfimu.base.errors import InputError
+from gfimu import InputError
 from gfimu.recording import Recording
 from sim import forward
 from sim.effects import CARRIAGE_EFFECTS, NOT_OF_A_CARRIAGE, TABLE_EFFECTS, make_effect

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from gfimu.array.array import AccelerometerArray
-from gfimu.base.errors import InputError
+from gfimu import AccelerometerArray, InputError
 from gfimu.base.files.model_files import find_model
 from sim import forward
 from sim.motions.motion import SpinState

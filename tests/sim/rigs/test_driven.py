@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from mujoco.batch import Batch, SimulationError
 
-from gfimu.array.array import AccelerometerArray
-from gfimu.base.errors import InputError
+from gfimu import AccelerometerArray, InputError
 from sim.motions.profiles import Hold, Ramp, spin_profile
 from sim.rigs.dc_motor import DcMotor
 from sim.rigs.driven import Drive, drive, drive_all

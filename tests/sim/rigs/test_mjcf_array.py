@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from gfimu.array.array import AccelerometerArray
-from gfimu.base.errors import InputError, RecordingWarning
+from gfimu import AccelerometerArray, InputError, RecordingWarning
 from gfimu.base.files.model_files import find_model
 from sim.rigs.mjcf_array import array_from_mjcf
 

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from gfimu.array.array import AccelerometerArray, Chip
-from gfimu.array.kinematics import specific_force
+from gfimu import AccelerometerArray, Chip, specific_force
 from gfimu.base.files.model_files import models_directory
 from sim.rigs.mjcf_array import array_from_mjcf
 from sim.rigs.mjcf_export import RIGS, array_as_mjcf

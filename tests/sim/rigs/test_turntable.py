@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from gfimu.array.array import AccelerometerArray, Chip
-from gfimu.array.kinematics import specific_force
-from gfimu.base.errors import InputError
+from gfimu import AccelerometerArray, Chip, InputError, specific_force
 from gfimu.base.units import STANDARD_GRAVITY
 from sim import forward
 from sim.effects import make_effect

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from gfimu.base.errors import WriteError
+from gfimu import WriteError
 from gfimu.base.files.atomic_file import _own_prefix, atomic_folder, atomic_path, write_text
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="processes can't be asked for there")

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from gfimu.base.errors import InputError
+from gfimu import InputError
 from gfimu.base.files.input_file import check_input, is_ordinary, parsing, read_bytes, unpacked
 from gfimu.base.files.memory import MemoryLimit
 from gfimu.base.files.model_files import parse_toml

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 import msgspec
 import pytest
 
-from gfimu.base.errors import InputError
+from gfimu import InputError
 from gfimu.base.files.schema import NotNegative, Positive, Table, Triple, about, read
 
 

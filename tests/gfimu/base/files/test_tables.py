@@ -7,10 +7,20 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from gfimu import AccelerometerArray, InputError, Recording, SensorErrors, estimate, estimate_rate, open_recording
-from gfimu.base.errors import CorruptValueWarning, GfimuError, UnitError
+from gfimu import (
+    AccelerometerArray,
+    CorruptValueWarning,
+    Estimate,
+    GfimuError,
+    InputError,
+    Recording,
+    SensorErrors,
+    UnitError,
+    estimate,
+    estimate_rate,
+    open_recording,
+)
 from gfimu.base.units import STANDARD_GRAVITY
-from gfimu.motion.estimate import Estimate
 from gfimu.recording.formats import open_run
 
 CUBE = AccelerometerArray.load("cube12")

@@ -26,15 +26,15 @@ from firmware_bridge.loop.virtual_run import VirtualRun
 from firmware_bridge.lpc1768.build import BuildReport
 from firmware_bridge.strict.check import CheckReport
 from firmware_bridge.strict.findings import Finding
+from gfimu import CampaignStatus, DemoResult
 from gfimu.base.lazy_names import homes_of
 from gfimu.base.results import PlottedResult, TableResult
 from gfimu.commands.benchmark_results import BenchmarkRun
-from gfimu.commands.demo_steps import DemoResult, Row
+from gfimu.commands.demo_steps import Row
 from gfimu.recording.joining import ReferenceSeries, join_reference
 from sim.trials.benchmark.judged import Judged
 from sim.trials.benchmark.table import Judgement
 from sim.trials.sweep.pace import Run
-from sim.trials.sweep.results import CampaignStatus
 
 PACKAGES = ("gfimu", "sim", "firmware_bridge")
 

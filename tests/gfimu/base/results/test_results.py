@@ -10,12 +10,11 @@ import pyarrow as pa
 import pytest
 
 import gfimu
-from gfimu.base.errors import GfimuError
+from gfimu import Estimate, GfimuError
 from gfimu.base.results import Panel, PlottedResult, Series, TableResult, result_html, text_column
 from gfimu.base.results.figure import drawn
 from gfimu.base.results.html import MOST_ROWS
 from gfimu.base.results.panels import axis_series
-from gfimu.motion.estimate import Estimate
 
 
 class Checker(HTMLParser):

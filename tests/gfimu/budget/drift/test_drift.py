@@ -9,12 +9,9 @@ import scipy.linalg
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gfimu.array.array import AccelerometerArray
-from gfimu.base.errors import InputError
-from gfimu.budget.drift.budget import TILT_LIMIT, drift_budget, motion_covariance
-from gfimu.budget.drift.closed_forms import ErrorSources, position_error
-from gfimu.budget.drift.monte_carlo import monte_carlo_drift
-from gfimu.motion.equivalent_errors import equivalent_rate_drift
+from gfimu import AccelerometerArray, ErrorSources, InputError, drift_budget, equivalent_rate_drift, monte_carlo_drift
+from gfimu.budget.drift.budget import TILT_LIMIT, motion_covariance
+from gfimu.budget.drift.closed_forms import position_error
 
 G = 9.80665
 MG = G / 1000

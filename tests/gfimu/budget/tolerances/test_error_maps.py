@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from tolerance_cases import ONLY, estimated, motion_of, only, perfect, poses, run_of
 
-from gfimu.array.array import AccelerometerArray
+from gfimu import AccelerometerArray
 from gfimu.budget.tolerances.budget import tolerance_budget
 from gfimu.budget.tolerances.calibrated import remaining
 from gfimu.budget.tolerances.propagation import error_maps, null_space_of

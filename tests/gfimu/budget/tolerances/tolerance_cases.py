@@ -7,11 +7,10 @@ from functools import cache
 
 import numpy as np
 
-from gfimu.array.array import AccelerometerArray
+from gfimu import AccelerometerArray, ChipErrors, Estimate
 from gfimu.budget.tolerances.calibrated import Poses
 from gfimu.budget.tolerances.known_motion import KnownMotion
-from gfimu.budget.tolerances.tolerances import ChipErrors, Tolerances
-from gfimu.motion.estimate import Estimate
+from gfimu.budget.tolerances.tolerances import Tolerances
 from gfimu.motion.estimation import estimate
 from sim.chips.adxl345 import SensorErrors
 from sim.motions.pose_sequence import PoseSequence

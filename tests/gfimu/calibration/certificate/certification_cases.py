@@ -3,9 +3,9 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from gfimu import Calibration
 from gfimu.calibration.error_model import ErrorModel
 from gfimu.calibration.parameter_names import parameter_names, quadratic_names
-from gfimu.calibration.result import Calibration
 
 PARAMETERS = 15
 """Of one chip with a full matrix: nine of M, three of b, three of q."""

@@ -6,15 +6,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from gfimu.array.array import AccelerometerArray
-from gfimu.array.kinematics import specific_force
-from gfimu.base.errors import GeometryError, InputError
+from gfimu import AccelerometerArray, Calibration, GeometryError, InputError, certificate, specific_force
 from gfimu.calibration.certificate.angular import angular_sensor_sheet
 from gfimu.calibration.certificate.angular.response import response
 from gfimu.calibration.certificate.certificate import Term
 from gfimu.calibration.parameter_names import parameter_names
-from gfimu.calibration.result import Calibration
-from gfimu.commands.certificate import certificate
 from gfimu.recording import Recording
 from gfimu.recording.carried_array import array_metadata
 from gfimu.sensor_noise import flicker_noise

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from certification_cases import calibration_of, random_covariance, random_model, random_rotation
 
-from gfimu.base.errors import InputError
-from gfimu.calibration.certificate.certificate import Certificate, Component, Sheet, Term
+from gfimu import Certificate, InputError
+from gfimu.calibration.certificate.certificate import Component, Sheet, Term
 from gfimu.calibration.certificate.certify import certify
 from gfimu.calibration.certificate.quantities import stated_quantities
 from gfimu.calibration.certificate.schema import SCHEMA_FILE, certificate_schema

@@ -7,7 +7,7 @@ import pytest
 from certification_cases import calibration_of, random_covariance, random_model, random_rotation
 from scipy.stats import norm
 
-from gfimu.base.errors import InputError, UnitError
+from gfimu import InputError, UnitError
 from gfimu.calibration.certificate.certify import certify
 from gfimu.calibration.certificate.comparison import compare
 from gfimu.calibration.multi_position import multi_position

@@ -7,13 +7,11 @@ import numpy as np
 import pytest
 
 import gfimu
-from gfimu.array.array import AccelerometerArray
-from gfimu.base.errors import InputError
+from gfimu import AccelerometerArray, Calibration, InputError
 from gfimu.calibration.exporting.calibrated_chip import calibrated_chips, number
 from gfimu.calibration.exporting.kalibr import lower_form
 from gfimu.calibration.exporting.ros import inverse_form
 from gfimu.calibration.parameter_names import parameter_names
-from gfimu.calibration.result import Calibration
 from gfimu.recording import Recording
 
 ruamel = pytest.importorskip("ruamel.yaml", reason="comes with rosbags, of the extra 'test'")

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 import gfimu
-from gfimu.array.array import AccelerometerArray
-from gfimu.base.errors import InputError
+from gfimu import AccelerometerArray, InputError, load_map
 from gfimu.recording import Recording
-from gfimu.recording.importing import inspect_file, load_map
+from gfimu.recording.importing import inspect_file
 from gfimu.recording.mapped import mapped_recording
 
 ARRAY = AccelerometerArray.load("cube12_as_built")

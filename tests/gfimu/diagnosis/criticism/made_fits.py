@@ -8,7 +8,7 @@ from functools import cache
 
 import numpy as np
 
-from gfimu.array.array import AccelerometerArray
+from gfimu import AccelerometerArray
 from gfimu.diagnosis.data.stretch import Stretch, make_stretches
 from gfimu.diagnosis.diagnose import prepare
 from gfimu.diagnosis.fit.gauss_newton import Fit, fit

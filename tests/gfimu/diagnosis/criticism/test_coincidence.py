@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from gfimu.array.array import AccelerometerArray
+from gfimu import AccelerometerArray
 from gfimu.diagnosis.criticism.coincidence.bound_numbers import coincidences
 from gfimu.diagnosis.criticism.coincidence.patterns import Pattern, channel_patterns, chip_patterns, distinct
 from gfimu.diagnosis.fit.gauss_newton import Fit

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from made_bodies import TWIN, hand_motion, hand_recording, hand_stretch
 
-from gfimu.base.errors import InputError
+from gfimu import InputError
 from gfimu.diagnosis.data.body.prepared import prepare_bodies, robust_prediction
 
 MOTION = hand_motion()

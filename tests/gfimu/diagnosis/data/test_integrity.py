@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
 
-from gfimu.array.array import AccelerometerArray
+from gfimu import AccelerometerArray
+from gfimu.diagnosis import diagnose
 from gfimu.diagnosis.data.integrity import check_integrity
 from gfimu.diagnosis.data.run import prepare_run
 from gfimu.diagnosis.data.samples import frozen_stretches
-from gfimu.diagnosis.diagnose import diagnose
 from sim.effects import make_effect
 from sim.motions.motion import SplineSpin
 from sim.trials.worlds.hidden import Measurement, measure

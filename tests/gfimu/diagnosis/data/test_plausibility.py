@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gfimu.array.array import AccelerometerArray
-from gfimu.base.errors import InputError
+from gfimu import AccelerometerArray, InputError
 from gfimu.base.units import STANDARD_GRAVITY
+from gfimu.diagnosis import diagnose
 from gfimu.diagnosis.data.run import prepare_run
-from gfimu.diagnosis.diagnose import diagnose, prepare
+from gfimu.diagnosis.diagnose import prepare
 from sim.effects import EFFECTS
 from sim.trials.worlds.hidden import Measurement, hidden_effect, measure, random_profile
 from sim.twin import Twin

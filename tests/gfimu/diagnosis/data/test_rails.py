@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
 
-from gfimu.array.array import AccelerometerArray, Chip
+from gfimu import AccelerometerArray, Chip
+from gfimu.diagnosis import diagnose
 from gfimu.diagnosis.data.integrity import check_integrity
 from gfimu.diagnosis.data.run import prepare_run
-from gfimu.diagnosis.diagnose import diagnose
 from gfimu.recording.importing.oddities import rails_of
 from sim.effects import make_effect
 from sim.motions.motion import SplineSpin

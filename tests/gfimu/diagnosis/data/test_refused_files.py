@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from core_cases import lively, small_twin, stretches_of
 
-from gfimu.base.errors import InputError
+from gfimu import InputError
 from gfimu.diagnosis.data.plausibility import refuse_implausible
 
 TWIN = small_twin("cube12")

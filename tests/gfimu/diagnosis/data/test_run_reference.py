@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gfimu.base.errors import InputError
+from gfimu import InputError
 from gfimu.diagnosis.data.reference import (
     BRIDGED_GAP,
     REFERENCE_COLUMNS,

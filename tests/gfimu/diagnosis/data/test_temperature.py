@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from gfimu.array.array import AccelerometerArray
+from gfimu import AccelerometerArray
 from gfimu.diagnosis import diagnose
 from gfimu.diagnosis.data.rounding import between_steps
 from sim.effects import make_effect

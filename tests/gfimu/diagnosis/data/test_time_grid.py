@@ -8,11 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gfimu.array.array import AccelerometerArray
-from gfimu.base.errors import RecordingWarning
+from gfimu import AccelerometerArray, RecordingWarning
+from gfimu.diagnosis import diagnose
 from gfimu.diagnosis.data.run import prepare_run
 from gfimu.diagnosis.data.time_grid import time_grid
-from gfimu.diagnosis.diagnose import diagnose
 from gfimu.recording import Recording
 from sim.trials.worlds.hidden import Measurement, measure
 from sim.twin import Twin

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gfimu.base.errors import InputError
+from gfimu import InputError
+from gfimu.diagnosis import diagnose
 from gfimu.diagnosis.data.run import prepare_run
 from gfimu.diagnosis.design.ambiguity import open_effects
 from gfimu.diagnosis.design.design import Limits, design
@@ -21,7 +22,6 @@ from gfimu.diagnosis.design.distinguishability import (
 from gfimu.diagnosis.design.planned_run import planned
 from gfimu.diagnosis.design.profile_search import plain_profile, profile_of, starting_points
 from gfimu.diagnosis.design.proposal import SEPARATED
-from gfimu.diagnosis.diagnose import diagnose
 from sim.effects import make_effect
 from sim.scenarios import Scenario
 from sim.trials.worlds.hidden import Measurement, measure, random_profile

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import nnls
 
-from gfimu.base.errors import InputError
+from gfimu import InputError
 from gfimu.diagnosis.design.distinguishability import (
     Contender,
     PlannedRun,

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from gfimu.array.array import AccelerometerArray
-from gfimu.base.errors import InputError
+from gfimu import AccelerometerArray, InputError
 from gfimu.diagnosis.design.run_check import check_runs, turns_one_way
 from gfimu.recording import Recording
 from sim.trials.worlds.hidden import Measurement, measure

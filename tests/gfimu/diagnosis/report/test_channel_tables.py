@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from made_runs import PERIOD, made_view
 
-from gfimu.array.array import AccelerometerArray, Chip
+from gfimu import AccelerometerArray, Chip
 from gfimu.diagnosis.criticism.views.dependence import Fingerprint
 from gfimu.diagnosis.criticism.views.residuals import residual_views
 from gfimu.diagnosis.report.channel_tables import channel_bars, fingerprint_rows

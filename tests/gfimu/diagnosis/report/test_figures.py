@@ -13,7 +13,7 @@ import pytest
 from made_runs import PERIOD, made_view
 from PIL import Image
 
-from gfimu.array.array import AccelerometerArray, Chip
+from gfimu import AccelerometerArray, Chip
 from gfimu.base.results.colours import AFTER_ON_PAPER, BEFORE_ON_PAPER, chip_colour, css
 from gfimu.diagnosis.criticism.views.residuals import residual_views
 from gfimu.diagnosis.report import figures

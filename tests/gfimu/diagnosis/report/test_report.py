@@ -14,11 +14,10 @@ import numpy as np
 import pytest
 from made_diagnoses import made_diagnosis
 
-from gfimu.base.errors import InputError
+from gfimu import InputError, NamedCause
 from gfimu.diagnosis.report.folder import check_folder, write_diagnosis
 from gfimu.diagnosis.report.page import report_html
 from gfimu.diagnosis.report.plain_words import headline, next_steps, odds, parameter_texts, percent, story
-from gfimu.diagnosis.verdict.parts import NamedCause
 
 VERDICTS = ("explained", "ambiguous", "unknown", "nothing_found")
 

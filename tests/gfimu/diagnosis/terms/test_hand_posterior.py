@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
 
-from gfimu.array.array import AccelerometerArray, Chip
-from gfimu.array.turning_axis import TurningAxis
+from gfimu import AccelerometerArray, Chip, TurningAxis
 from gfimu.diagnosis.data.body.run import prepare_body_run
 from gfimu.diagnosis.data.body.stretch import make_body_stretches
 from gfimu.diagnosis.fit.gauss_newton import determined, fit

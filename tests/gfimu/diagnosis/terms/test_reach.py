@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gfimu.array.array import AccelerometerArray
+from gfimu import AccelerometerArray
 from gfimu.diagnosis.terms.reach import behind_wiring, disjoint
 from gfimu.motion.body_drive import BodyDrive
 from sim.effects import BODY_EFFECTS, make_effect

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gfimu.array.array import AccelerometerArray
+from gfimu import AccelerometerArray, NamedCause
 from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.verdict.gate import impossible_sizes, judge, measurable
-from gfimu.diagnosis.verdict.parts import NamedCause, Residual, Unexplained
+from gfimu.diagnosis.verdict.parts import Residual, Unexplained
 from gfimu.diagnosis.verdict.wording import verdict_sentences
 from sim.effects import EFFECTS
 from sim.twin import Twin

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from made_diagnoses import made_diagnosis
 
+from gfimu import NamedCause
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.verdict.library import (
     LibraryEvidence,
@@ -14,7 +15,6 @@ from gfimu.diagnosis.verdict.library import (
     standing_out,
     with_library,
 )
-from gfimu.diagnosis.verdict.parts import NamedCause
 
 POLICY, RULE = Policy(), LibraryRule()
 

@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gfimu.array.array import AccelerometerArray
-from gfimu.diagnosis.diagnose import diagnose, prepare
+from gfimu import AccelerometerArray
+from gfimu.diagnosis import diagnose
+from gfimu.diagnosis.diagnose import prepare
 from gfimu.diagnosis.fit.learn import predicted_by_reference
 from gfimu.diagnosis.verdict.likely_mistakes import likely_mistake
 from sim.effects import make_effect

@@ -9,6 +9,7 @@ import pytest
 from core_cases import cause_of, lively, small_twin, stretches_of
 from numpy.testing import assert_allclose
 
+from gfimu import NamedCause
 from gfimu.diagnosis.fit.gauss_newton import Fit
 from gfimu.diagnosis.fit.learn import starting_point
 from gfimu.diagnosis.fit.linear import Point
@@ -27,7 +28,6 @@ from gfimu.diagnosis.verdict.naming import (
     probabilities,
     rival_list,
 )
-from gfimu.diagnosis.verdict.parts import NamedCause
 from sim.effects import EFFECTS, make_effect
 
 TWIN = small_twin("cube12")

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from few_effects import having
 
-from gfimu.array.array import AccelerometerArray
+from gfimu import AccelerometerArray
+from gfimu.diagnosis import diagnose
 from gfimu.diagnosis.data.stretch import make_stretches
-from gfimu.diagnosis.diagnose import diagnose, prepare
+from gfimu.diagnosis.diagnose import prepare
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.report.page import report_html
 from gfimu.diagnosis.verdict.place import with_place

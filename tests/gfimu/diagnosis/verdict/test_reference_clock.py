@@ -8,7 +8,8 @@ from dataclasses import replace
 import pytest
 from made_diagnoses import made_diagnosis
 
-from gfimu.diagnosis.verdict.parts import NamedCause, ReferenceClock
+from gfimu import NamedCause
+from gfimu.diagnosis.verdict.parts import ReferenceClock
 from gfimu.diagnosis.verdict.sample_notes import with_reference_clock
 from sim.twin import Twin
 

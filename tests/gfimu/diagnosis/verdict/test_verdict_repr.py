@@ -7,11 +7,9 @@ import pytest
 from made_diagnoses import made_diagnosis
 
 import gfimu
-from gfimu.base.errors import InputError
+from gfimu import Diagnosis, InputError, NamedCause
 from gfimu.diagnosis.report.picture import _notes
 from gfimu.diagnosis.report.plain_words import parameter_units
-from gfimu.diagnosis.verdict.parts import NamedCause
-from gfimu.diagnosis.verdict.verdict import Diagnosis
 
 
 def test_one_line():

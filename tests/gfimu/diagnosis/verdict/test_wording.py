@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from gfimu import NamedCause
 from gfimu.diagnosis.criticism.gain import Gain
-from gfimu.diagnosis.verdict.parts import NamedCause, Residual, Unexplained
+from gfimu.diagnosis.verdict.parts import Residual, Unexplained
 from gfimu.diagnosis.verdict.wording import Notes, verdict_sentences
 
 FALLS = Residual(0.3, 0.1, 0.1, {}, {})

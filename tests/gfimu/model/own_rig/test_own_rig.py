@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import gfimu
-from gfimu.base.errors import InputError
+from gfimu import InputError
 from gfimu.diagnosis.terms.spline import State
 from gfimu.model.generic_basis import OF_READING
 from gfimu.model.own_rig import Cause, Parameter, SimulatorModel, bias_cause, gain_cause, load_model

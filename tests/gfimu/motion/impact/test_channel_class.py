@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, freqz
 
-from gfimu.base.errors import InputError
+from gfimu import InputError
 from gfimu.motion.impact.channel_class import CHANNEL_CLASSES, STANDARDS, channel_filter, filter_coefficients
 
 

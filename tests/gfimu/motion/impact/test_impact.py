@@ -5,9 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gfimu.array.array import AccelerometerArray
-from gfimu.array.kinematics import specific_force
-from gfimu.base.errors import InputError
+from gfimu import AccelerometerArray, InputError, specific_force
 from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.motion.impact.criteria import head_injury_criterion
 from gfimu.motion.impact.event import ImpactSettings, measure_impact, time_zero

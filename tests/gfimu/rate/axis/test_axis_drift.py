@@ -7,8 +7,7 @@ import pytest
 from turning import NOISE, RATE, array_of, turned
 
 import gfimu
-from gfimu.array.turning_axis import TurningAxis
-from gfimu.base.errors import GeometryError, InputError
+from gfimu import GeometryError, InputError, TurningAxis
 from gfimu.rate.axis.accuracy.drift import axis_drift
 from gfimu.rate.axis.channels import AxisChannels
 from gfimu.rate.axis.problem import AxisProblem, Settings

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from gfimu.array.array import AccelerometerArray, Chip
+from gfimu import AccelerometerArray, Chip
 from gfimu.rate.axis.few_motions import few_motions_text
 
 

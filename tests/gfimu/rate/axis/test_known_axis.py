@@ -7,9 +7,7 @@ import pytest
 from turning import NOISE, RATE, array_of, turned
 
 import gfimu
-from gfimu.array.array import AccelerometerArray, Chip
-from gfimu.array.turning_axis import TurningAxis
-from gfimu.base.errors import GeometryError, InputError
+from gfimu import AccelerometerArray, Chip, GeometryError, InputError, TurningAxis
 from gfimu.motion.attitude import to_rotation
 from gfimu.motion.axis_estimation import estimate_about_axis
 from gfimu.rate.axis.accuracy.bounds import axis_bounds

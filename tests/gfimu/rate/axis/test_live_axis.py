@@ -7,8 +7,8 @@ import pytest
 from turning import array_of, turned
 
 import gfimu
-from gfimu.array.turning_axis import AxisUncertainty, TurningAxis
-from gfimu.base.errors import InputError
+from gfimu import InputError, TurningAxis
+from gfimu.array.turning_axis import AxisUncertainty
 from gfimu.rate.axis.live import LiveAxisFilter
 
 ONE = array_of((0.1, 0.0, 0.02))

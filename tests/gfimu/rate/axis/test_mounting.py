@@ -9,9 +9,8 @@ import pytest
 from scipy import stats
 from turning import NOISE, array_of, mounted
 
-from gfimu.array.array import AccelerometerArray
-from gfimu.array.turning_axis import AxisUncertainty, TurningAxis
-from gfimu.base.errors import InputError
+from gfimu import AccelerometerArray, InputError, TurningAxis
+from gfimu.array.turning_axis import AxisUncertainty
 from gfimu.motion.axis_estimation import estimate_about_axis
 from gfimu.rate.axis.channels import AxisChannels
 from gfimu.rate.axis.mounting import Mounting

@@ -5,8 +5,8 @@ import pytest
 from turning import NOISE, RATE, array_of
 
 import gfimu
-from gfimu.array.turning_axis import AxisUncertainty, TurningAxis
-from gfimu.base.errors import InputError
+from gfimu import InputError, TurningAxis
+from gfimu.array.turning_axis import AxisUncertainty
 from gfimu.commands.known_axis import KnownAxis
 from gfimu.motion.axis_estimation import estimate_about_axis
 from gfimu.rate.axis.accuracy.bounds import axis_bounds

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from gfimu.array.array import AccelerometerArray, Chip
+from gfimu import AccelerometerArray, Chip
 from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.recording import Recording
 

@@ -4,11 +4,9 @@ import numpy as np
 import pytest
 from watched_world import CALIBRATED, CUBE, GRAVITY, readings
 
-from gfimu.array.array import AccelerometerArray
-from gfimu.base.errors import InputError
+from gfimu import AccelerometerArray, InputError, SensorErrors
 from gfimu.rate.health import MonitorPolicy, detectable_faults, fault_protection, watch_channels
 from gfimu.rate.health.protection import protection_remark
-from gfimu.rate.sensing import SensorErrors
 
 MG = 1e-3 * GRAVITY
 

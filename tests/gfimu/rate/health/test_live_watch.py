@@ -6,16 +6,13 @@ import numpy as np
 import pytest
 from watched_world import CALIBRATED, CUBE, GRAVITY, RATE_HZ, readings
 
-from gfimu.array.array import AccelerometerArray
-from gfimu.base.errors import InputError
+from gfimu import AccelerometerArray, InputError, LiveRateFilter, SensorErrors
 from gfimu.rate.filter import filter_rate
 from gfimu.rate.health.fault import HealthCode
 from gfimu.rate.health.live.channel_watch import LiveWatch
 from gfimu.rate.health.live.watched_filter import WatchedRateFilter
 from gfimu.rate.health.watch import watch_from_rest
 from gfimu.rate.kalman import FilterSettings
-from gfimu.rate.live import LiveRateFilter
-from gfimu.rate.sensing import SensorErrors
 from gfimu.rate.stream import filter_stream
 
 MG = 1e-3 * GRAVITY

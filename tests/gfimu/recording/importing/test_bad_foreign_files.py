@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import gfimu
-from gfimu.base.errors import InputError, RecordingWarning, UnitError
-from gfimu.recording.importing import inspect_file, load_map
+from gfimu import InputError, RecordingWarning, UnitError, load_map
+from gfimu.recording.importing import inspect_file
 from gfimu.recording.importing.oddities import oddities
 from gfimu.recording.mapped import mapped_recording
 

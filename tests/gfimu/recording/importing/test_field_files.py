@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import gfimu
-from gfimu.base.errors import GfimuError, InputError, RecordingWarning
-from gfimu.recording.importing import inspect_file, load_map
+from gfimu import GfimuError, InputError, RecordingWarning, load_map
+from gfimu.recording.importing import inspect_file
 from gfimu.recording.importing.notation import factor_of
 from gfimu.recording.mapped import mapped_recording
 

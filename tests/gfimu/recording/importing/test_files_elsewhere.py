@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gfimu.base.errors import InputError
+from gfimu import InputError
 from gfimu.recording.importing.readers import read_foreign
 
 h5py = pytest.importorskip("h5py")

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 import gfimu
-from gfimu.base.errors import InputError
+from gfimu import InputError
 from gfimu.recording.importing import inspect_file
 from gfimu.recording.importing.guessing.likely_reference import likely_references, reference_remedy
 from gfimu.recording.importing.raw_table import RawTable

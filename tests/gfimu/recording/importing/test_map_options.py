@@ -8,9 +8,8 @@ import pytest
 import typer
 
 import gfimu
-from gfimu.base.errors import InputError
+from gfimu import InputError, load_map
 from gfimu.commands.shell.program import program
-from gfimu.recording.importing import load_map
 from gfimu.recording.importing.column_map import ColumnSpec
 from gfimu.recording.mapped import mapped_recording
 
@@ -111,7 +110,7 @@ def test_only_a_part_of_the_file_is_taken(plain):
 
 
 def test_an_array_beside_its_map_is_found_from_elsewhere(plain, tmp_path):
-    from gfimu.array.array import AccelerometerArray
+    from gfimu import AccelerometerArray
 
     folder = tmp_path / "maps"
     folder.mkdir()

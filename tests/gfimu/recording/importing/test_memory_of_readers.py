@@ -15,11 +15,10 @@ import pyarrow.parquet as pq
 import pytest
 
 import gfimu
-from gfimu.base.errors import InputError
+from gfimu import InputError, read_mimu4444
 from gfimu.base.files.memory import MemoryLimit, MemoryLimitError, with_memory
 from gfimu.recording import Recording
 from gfimu.recording.importing.readers import read_foreign
-from gfimu.recording.mimu4444 import read_mimu4444
 
 LIMIT = "20MB"
 ENOUGH = "600MB"

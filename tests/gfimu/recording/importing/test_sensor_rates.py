@@ -7,9 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import gfimu
-from gfimu import InputError
-from gfimu.base.errors import RecordingWarning
-from gfimu.recording.importing import load_map
+from gfimu import InputError, RecordingWarning, load_map
 from gfimu.recording.importing.piece import nearest_rows
 from gfimu.recording.timing.reference_times import reference_on_rows, reference_series
 

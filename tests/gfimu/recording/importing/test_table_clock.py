@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gfimu.base.errors import InputError
+from gfimu import InputError
 from gfimu.recording.importing.clock import increasing_times, parts_of, times_of
 from gfimu.recording.importing.column_map import TimeSpec
 from gfimu.recording.importing.raw_table import RawTable

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gfimu.base.errors import InputError
+from gfimu import InputError
 from gfimu.recording.importing.column_map import TextSpec
 from gfimu.recording.importing.readers.text import table_of_text
 

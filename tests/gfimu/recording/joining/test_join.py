@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import gfimu
-from gfimu.array.array import AccelerometerArray
-from gfimu.base.errors import InputError
+from gfimu import AccelerometerArray, InputError
 from gfimu.recording import Recording
 from gfimu.recording.joining import ReferenceSeries, join_reference, open_reference
 from gfimu.recording.joining.signals import functions_of

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gfimu.array.array import AccelerometerArray
+from gfimu import AccelerometerArray
 from gfimu.recording.joining import displaced_reference
 from sim.effects import make_effect
 from sim.scenarios import Scenario

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gfimu.base.errors import InputError
+from gfimu import InputError
 from sim.effects import EFFECTS
 from sim.trials.benchmark.answer import Answer, CauseAnswer, ParameterAnswer, answer_of
 from sim.trials.benchmark.judge import POINTS, claims_of, judge, outcome_of

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import gfimu
-from gfimu.base.errors import InputError
+from gfimu import InputError
 from sim.effects import EFFECTS
 from sim.trials.benchmark import baselines
 from sim.trials.benchmark.answer import answer_of, read_answers

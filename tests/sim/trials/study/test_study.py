@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from gfimu.base.errors import InputError
+from gfimu import InputError
 from sim.trials.study.__main__ import main
 from sim.trials.study.cases import Case
 from sim.trials.study.outcome import draw_world

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gfimu.base.errors import InputError
+from gfimu import InputError
 from sim.effects import EFFECTS
 from sim.trials.study import __main__ as study
 from sim.trials.study import blame, plan

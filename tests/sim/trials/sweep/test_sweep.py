@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 import pytest
 from sweep_cases import always_dies, dies_once, quick
 
-from gfimu.base.errors import InputError
+from gfimu import InputError
 from sim.trials.sweep.dataset import Dataset
 from sim.trials.sweep.design import Design
 from sim.trials.sweep.engine import Workers, run_campaign

@@ -13,7 +13,7 @@ from types import ModuleType
 import pytest
 from sweep_cases import always_dies, counted, waits
 
-from gfimu.base.errors import GfimuError, InputError, RecordingWarning
+from gfimu import GfimuError, InputError, RecordingWarning
 from sim.trials.sweep.cluster import open_cluster
 from sim.trials.sweep.dataset import Dataset
 from sim.trials.sweep.engine import run_campaign

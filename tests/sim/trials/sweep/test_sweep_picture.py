@@ -5,7 +5,7 @@ import pyarrow as pa
 import pytest
 from matplotlib.figure import Figure
 
-from gfimu.base.errors import InputError
+from gfimu import InputError
 from sim.trials.sweep.design import Design
 from sim.trials.sweep.panels import draw_over, label
 from sim.trials.sweep.picture import campaign_picture

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gfimu.base.errors import InputError
+from gfimu import InputError
 from sim import forward
 from sim.effects import make_effect
 from sim.trials.worlds.factory import WorldFactory

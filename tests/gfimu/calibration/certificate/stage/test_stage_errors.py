@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gfimu.base.errors import InputError
+from gfimu import InputError
 from gfimu.calibration.certificate.stage.stage import Stage
 from gfimu.calibration.certificate.stage.stage_errors import (
     SOURCES,

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gfimu.array.array import AccelerometerArray
+from gfimu import AccelerometerArray
 from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.calibration.array_static import array_static
 from gfimu.calibration.certificate.stage.simulated_calibration import calibrate_under, poses_of
