@@ -113,8 +113,7 @@ def write_inputs() -> None:
 
     from gfimu import AccelerometerArray, Recording
     from sim.effects import make_effect
-    from sim.trials.worlds.factory import WorldFactory
-    from sim.trials.worlds.hidden import Measurement
+    from sim.trials import Measurement, WorldFactory
     from sim.twin import Twin
 
     rng = np.random.default_rng(1)
@@ -134,7 +133,7 @@ def write_inputs() -> None:
 
 def call(arguments: str) -> tuple[int, str]:
     """Return the exit code of a call of the program, and all that it printed."""
-    from gfimu.commands.shell.program import main
+    from gfimu.commands import main
 
     printed = io.StringIO()
     sys.argv = ["gfimu", *arguments.split()]

@@ -11,12 +11,10 @@ from typing import Any
 import numpy as np
 
 from gfimu import AccelerometerArray
-from gfimu.array.parts.limits import PartLimits
-from gfimu.array.parts.part import Part
-from gfimu.base.files.model_files import list_models
-from sim.chips.data_sheet import DataSheet
+from gfimu.array import Part, PartLimits
+from gfimu.base import list_models
+from sim import DataSheet, SplineSpin
 from sim.effects import Effect
-from sim.motions.motion import SplineSpin
 from sim.scenarios import Scenario
 from sim.twin import Twin
 

@@ -5,9 +5,7 @@ import struct
 
 import pytest
 
-from sim.trials.campaign.cases import check_factors
-from sim.trials.sweep.design import Design
-from sim.trials.sweep.plan import load_plan
+from sim.trials import Design, check_factors, load_plan
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ import shlex
 import pytest
 
 import gfimu
-from gfimu.commands.shell.command_group import CommandGroup
+from gfimu.commands import CommandGroup
 
 ROW_CELLS = 6  # item, as printed, as derived, as run, agreement, difference
 

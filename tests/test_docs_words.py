@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from gfimu.commands.shell.command_group import CommandGroup
+from gfimu.commands import CommandGroup
 
 VAGUE = re.compile(
     r"\b(wander\w*|told|tells?|felt|feels?|hears?|heard|loosen\w*|ringing|rings|rung|imitat\w*|gross|faint|honest\w*)\b"

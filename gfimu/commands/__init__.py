@@ -3,3 +3,17 @@
 In: paths or objects.
 Out: the result object, files where an ``out`` is named. The one room of gfimu that knows the world and the wire.
 """
+
+from typing import TYPE_CHECKING
+
+from gfimu.base.lazy_names import declared_names
+
+if TYPE_CHECKING:
+    from gfimu.commands.shell.command_group import CommandGroup as CommandGroup
+    from gfimu.commands.shell.declare import command_of as command_of
+    from gfimu.commands.shell.output import print_table as print_table
+    from gfimu.commands.shell.printing import print_blocks as print_blocks
+    from gfimu.commands.shell.program import main as main
+    from gfimu.commands.shell.program import program as program
+else:
+    __getattr__, __dir__, __all__ = declared_names(__name__)

@@ -3,3 +3,16 @@
 In: a recording, with a calibration if there is one.
 Out: `Estimate` with its covariances, attitude, navigation, an impact and its criteria (`impact`).
 """
+
+from typing import TYPE_CHECKING
+
+from gfimu.base.lazy_names import declared_names
+
+if TYPE_CHECKING:
+    from gfimu.motion.attitude import from_rotation as from_rotation
+    from gfimu.motion.attitude import to_rotation as to_rotation
+    from gfimu.motion.axis_estimation import estimate_about_axis as estimate_about_axis
+    from gfimu.motion.body_drive import BodyDrive as BodyDrive
+    from gfimu.motion.rest_navigation import navigate_with_rest as navigate_with_rest
+else:
+    __getattr__, __dir__, __all__ = declared_names(__name__)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from gfimu.commands.shell.program import main
+from gfimu.commands import main
 
 
 @dataclass(frozen=True)

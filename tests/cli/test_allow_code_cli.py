@@ -13,8 +13,8 @@ import typer
 
 import gfimu
 from gfimu.base import plugins as loading
-from gfimu.commands.shell.program import program
-from gfimu.model.own_rig import load_model
+from gfimu.commands import program
+from gfimu.model import load_model
 from tests.gfimu.recording.importing import foreign_files
 
 WITH_TWIN = {

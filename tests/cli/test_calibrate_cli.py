@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gfimu import AccelerometerArray, Estimate, Recording, load_calibration, local_gravity, specific_force
-from gfimu.calibration.registry import METHODS
+from gfimu.calibration import METHODS
 from gfimu.sensor_noise import white_noise
 
 CUBE = AccelerometerArray.load("cube12")

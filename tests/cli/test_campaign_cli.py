@@ -64,9 +64,7 @@ def test_a_wrong_plan_is_one_line_and_writes_nothing(gfimu_command, tmp_path, te
 
 
 def checked(folder, text):
-    from sim.trials.campaign.cases import check_factors
-    from sim.trials.sweep.design import Design
-    from sim.trials.sweep.plan import load_plan
+    from sim.trials import Design, check_factors, load_plan
 
     (folder / "plan.toml").write_text(text)
     plan = load_plan(folder / "plan.toml")

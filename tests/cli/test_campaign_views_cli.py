@@ -215,7 +215,7 @@ if __name__ == "__main__":
 
 def test_a_share_is_not_called_a_median(capsys):
     from gfimu import CampaignTable
-    from gfimu.commands.shell.printing import print_blocks
+    from gfimu.commands import print_blocks
     from sim.trials.sweep.summary import Group
 
     groups = (Group({}, "exact", 4, 0, 0.3, 0.75, 0.95, share=True), Group({}, "size_m", 4, 0, 1.0, 2.0, 3.0))

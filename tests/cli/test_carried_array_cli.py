@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gfimu import AccelerometerArray, GfimuError, Recording
-from gfimu.recording.formats import open_run
+from gfimu.recording import open_run
 from sim.simulation import simulate
 
 SCENARIO = """

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from gfimu import load_calibration
-from gfimu.recording import Recording
-from gfimu.recording.importing import inspect_file
+from gfimu.recording import Recording, inspect_file
 
 
 @pytest.fixture(scope="module")

@@ -7,15 +7,15 @@ from every_item import every
 
 from firmware_bridge.frames.format_file import load_format
 from gfimu import AccelerometerArray, load_map
-from gfimu.array.parts.part import Part
+from gfimu.array import Part
 from gfimu.array_search.brief import load_brief
-from gfimu.base.files.model_files import find_model, list_models
-from gfimu.calibration.certificate.stage.stage import Stage
+from gfimu.base import find_model, list_models
+from gfimu.calibration import Stage
 from gfimu.commands.list import KINDS
 from gfimu.commands.new import TEMPLATES
-from sim.chips.data_sheet import DataSheet
+from sim import DataSheet
 from sim.scenarios import Scenario
-from sim.trials.sweep.plan import load_plan
+from sim.trials import load_plan
 from sim.twin import Twin
 
 LOADERS = {

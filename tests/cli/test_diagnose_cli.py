@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 
 from gfimu import AccelerometerArray, Recording
-from gfimu.base.files.model_files import find_model
-from gfimu.diagnosis.time_limit import check_time
+from gfimu.base import find_model
+from gfimu.diagnosis import check_time
+from sim import SplineSpin
 from sim.effects import make_effect
-from sim.motions.motion import SplineSpin
 from sim.scenarios import Scenario
 from sim.simulation import simulate
-from sim.trials.worlds.hidden import Measurement, measure, random_profile
+from sim.trials import Measurement, measure, random_profile
 from sim.twin import Twin
 
 TWIN = "cube12_turntable"

@@ -159,7 +159,7 @@ def test_a_full_disk_leaves_nothing_behind(gfimu_command, tmp_path, monkeypatch,
 
 def _linked(*arguments, cwd):
     """Stand in for the compiler: the committed image."""
-    from firmware_bridge.lpc1768.build import image_path
+    from firmware_bridge import image_path
 
     if "-o" not in arguments:
         return "0.16"

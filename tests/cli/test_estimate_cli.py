@@ -10,7 +10,7 @@ import pytest
 
 import gfimu
 from gfimu import AccelerometerArray, Estimate, Recording, specific_force
-from gfimu.base.units import STANDARD_GRAVITY
+from gfimu.base import STANDARD_GRAVITY
 
 CUBE = AccelerometerArray.load("cube12")
 

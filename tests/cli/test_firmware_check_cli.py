@@ -9,7 +9,7 @@ import pytest
 
 pytest.importorskip("unicorn", reason="the emulator is in the extra 'firmware'")
 
-from firmware_bridge.lpc1768.build import image_path
+from firmware_bridge import image_path
 
 
 def test_a_clean_image_is_exit_code_0(gfimu_command) -> None:

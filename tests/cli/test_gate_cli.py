@@ -11,7 +11,8 @@ import pytest
 import gfimu
 from gfimu import InputError, RecordingWarning
 from gfimu.commands.diagnose import EXPLAINED
-from gfimu.recording.checks import check_recording, examine
+from gfimu.recording import check_recording
+from gfimu.recording.checks import examine
 
 G = 9.80665
 CUBE = gfimu.AccelerometerArray.load("cube12")

@@ -11,9 +11,9 @@ import typer
 from every_item import every
 
 import gfimu
+from gfimu.commands import program
 from gfimu.commands.shell.command_list import COMMANDS, JOBS
 from gfimu.commands.shell.help_text import examples_of
-from gfimu.commands.shell.program import program
 
 GROUPS = ("benchmark", "campaign", "firmware")
 

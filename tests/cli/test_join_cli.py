@@ -7,7 +7,7 @@ from gfimu import AccelerometerArray
 from gfimu.diagnosis import diagnose
 from gfimu.recording import Recording
 from sim.effects import make_effect
-from sim.trials.worlds.hidden import Measurement, measure
+from sim.trials import Measurement, measure
 from sim.twin import Twin
 
 TWIN = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")

@@ -16,8 +16,8 @@ import pytest
 import gfimu
 from gfimu import InputError
 from gfimu.base.declared import struct_of
+from gfimu.commands import program
 from gfimu.commands.schema import schema_names
-from gfimu.commands.shell.program import program
 from gfimu.commands.show import Shown
 from tests.golden.calls import CALLS
 

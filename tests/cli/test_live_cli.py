@@ -12,9 +12,9 @@ import threading
 import numpy as np
 import pytest
 
-from firmware_bridge.host.journal import Journal
+from firmware_bridge import Journal
 from gfimu import AccelerometerArray, SensorErrors
-from gfimu.rate.filter import filter_rate
+from gfimu.rate import filter_rate
 
 CUBE = AccelerometerArray.load("cube12")
 RATE = 100.0

@@ -13,9 +13,8 @@ import typer
 from every_item import every
 
 import gfimu
-from gfimu.base.files.outputs import OutputFile, OutputFolder
-from gfimu.commands.shell.declare import command_of
-from gfimu.commands.shell.program import program
+from gfimu.base import OutputFile, OutputFolder
+from gfimu.commands import command_of, program
 
 OTHER_WORDS = {
     "--from": "source",

@@ -9,8 +9,8 @@ from every_item import every
 
 import gfimu
 from gfimu import AccelerometerArray
+from gfimu.commands import program
 from gfimu.commands.shell.command_list import COMMANDS, help_line
-from gfimu.commands.shell.program import program
 from gfimu.recording import Recording
 
 

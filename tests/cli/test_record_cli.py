@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from firmware_bridge.frames.decoder import FORMATS
+from firmware_bridge import FORMATS
 from firmware_bridge.loop import board_process
 from gfimu.recording import Recording
 
@@ -118,13 +118,13 @@ def test_a_full_disk_at_the_end_of_a_virtual_run(gfimu_command, tmp_path, monkey
 
 
 def test_an_interrupted_recording_is_whole(tmp_path) -> None:
-    from firmware_bridge.loop.virtual_port import TcpPort
+    from firmware_bridge import TcpPort
 
     port = TcpPort(0)
     out = tmp_path / "run.parquet"
     process = subprocess.Popen([GFIMU, "record", "--port", port.name, "--out", out, "--json"], stdout=subprocess.PIPE)
     try:
-        from firmware_bridge.frames.decoder import encode_samples
+        from firmware_bridge import encode_samples
 
         end = time.monotonic() + 30
         number = 0
@@ -150,8 +150,7 @@ def test_an_interrupted_recording_is_whole(tmp_path) -> None:
 @pytest.mark.parametrize("name", ["run.csv", "run.parquet"])
 def test_live_follows_what_record_is_writing(tmp_path, name) -> None:
     """Both processes at once: every sample comes through with its size, and live ends with the recording."""
-    from firmware_bridge.frames.decoder import encode_samples
-    from firmware_bridge.loop.virtual_port import TcpPort
+    from firmware_bridge import TcpPort, encode_samples
 
     chance, port, out, shown = np.random.default_rng(0), TcpPort(0), tmp_path / name, tmp_path / "shown"
     command = [GFIMU, "record", "--port", port.name, "--array", "cube12", "--out", out, "--json"]

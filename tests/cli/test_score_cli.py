@@ -5,7 +5,7 @@ import json
 import pytest
 
 from gfimu import AccelerometerArray
-from gfimu.array.observability import seeing_arrays
+from gfimu.array import seeing_arrays
 
 
 def test_without_arguments_compares_every_shipped_array(gfimu_command):

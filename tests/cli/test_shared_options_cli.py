@@ -10,10 +10,9 @@ import typer
 from every_item import every
 
 import gfimu
-from gfimu.commands import known_axis, place
+from gfimu.commands import known_axis, place, program
 from gfimu.commands.shell import options as shared
 from gfimu.commands.shell.declare import Group, Option, marked
-from gfimu.commands.shell.program import program
 
 OF_ITS_OWN = {
     "--array": {"firmware build"},  # a name that the board states, no array that is read

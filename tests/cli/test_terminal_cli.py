@@ -16,8 +16,8 @@ import pytest
 
 import gfimu
 from gfimu import load_map
-from gfimu.base.files.rerun_stream import markdown
-from gfimu.commands.shell.output import print_table
+from gfimu.base import markdown
+from gfimu.commands import print_table
 
 pty = pytest.importorskip("pty")
 fcntl = pytest.importorskip("fcntl")

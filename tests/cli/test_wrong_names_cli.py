@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import gfimu
-from gfimu.base.errors import nearest_name
+from gfimu.base import nearest_name
 
 
 @pytest.fixture(scope="module")

@@ -9,10 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from firmware_bridge.adxl345.device import Adxl345
-from firmware_bridge.adxl345.registers import TICKS_PER_SECOND, Adxl345Options
+from firmware_bridge import TICKS_PER_SECOND, Adxl345, Adxl345Options, image_path
 from firmware_bridge.frames.commands import sample_at
-from firmware_bridge.lpc1768.build import SOURCES, image_path
+from firmware_bridge.lpc1768.build import SOURCES
 from firmware_bridge.lpc1768.elf import ElfImage
 
 _FLAGS = (
@@ -52,8 +51,7 @@ def compile_image(tmp_path_factory):
 def make_board():
     """Build a board in this process: `Board` or `FastBoard`, our image unless told otherwise."""
     pytest.importorskip("unicorn", reason="the emulator is in the extra 'firmware'")
-    from firmware_bridge.board.board import Board
-    from firmware_bridge.board.fast_board import FastBoard
+    from firmware_bridge import Board, FastBoard
 
     def make(kind: str = "python", image: ElfImage | str = "gfimu", rate: int | None = None, **options):
         loaded = ElfImage.load(image_path(image)) if isinstance(image, str) else image

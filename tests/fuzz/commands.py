@@ -120,7 +120,7 @@ _OF_FILES = {"ARRAY", "TWIN", "MAP", "SCENARIO", "FILE", "RUN", "CAL", "PLAN", "
 
 def commands() -> dict[str, Any]:
     """Return every command of the program by its words."""
-    from gfimu.commands.shell.program import program
+    from gfimu.commands import program
 
     found: dict[str, Any] = {}
     for name, command in typer.main.get_command(program()).commands.items():
@@ -266,7 +266,7 @@ def run_all(only: str | None) -> int:
 
 def run(arguments: list[str]) -> tuple[int, str, str]:
     """Return exit code, standard output and standard error of a call in this process."""
-    from gfimu.commands.shell.program import main
+    from gfimu.commands import main
 
     out, err = io.StringIO(), io.StringIO()
     sys.argv = ["gfimu", *arguments]

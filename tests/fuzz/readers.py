@@ -44,13 +44,12 @@ def targets(folder: Path) -> dict[str, Target]:
     import foreign_files as foreign
 
     from gfimu import AccelerometerArray, load_calibration, load_map, open_recording
-    from gfimu.array.parts.part import Part
-    from gfimu.base.files.model_files import list_models
+    from gfimu.array import Part
+    from gfimu.base import list_models
     from gfimu.calibration.imu_tk import read_text_triad
-    from gfimu.recording.formats import open_run
-    from gfimu.recording.importing import inspect_file
+    from gfimu.recording import inspect_file, open_run
     from gfimu.recording.joining import open_reference
-    from sim.rigs.mjcf_array import array_from_mjcf
+    from sim import array_from_mjcf
     from sim.scenarios import Scenario
     from sim.twin import Twin
 
@@ -221,7 +220,7 @@ def _calibration(folder: Path) -> tuple[tuple[bytes, str], ...]:
 
 
 def _sent() -> tuple[tuple[bytes, str], ...]:
-    from firmware_bridge.frames.decoder import encode_samples
+    from firmware_bridge import encode_samples
 
     counts = np.arange(40 * 12).reshape(40, 12).astype(np.int16)
     times = np.arange(40) * 10_000
@@ -229,7 +228,7 @@ def _sent() -> tuple[tuple[bytes, str], ...]:
 
 
 def _frames(path: Path) -> None:
-    from firmware_bridge.frames.decoder import SampleDecoder
+    from firmware_bridge import SampleDecoder
     from gfimu.base.files.input_file import read_bytes
 
     decoder = SampleDecoder()

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from gfimu import AccelerometerArray, InputError, rate_bound, specific_force
-from gfimu.array.kinematics import omega_products
-from gfimu.rate.bounds.sample import alpha_std, omega_products_jacobian, rate_bound_isotropic, rate_information
+from gfimu.array import omega_products
+from gfimu.rate import alpha_std, omega_products_jacobian, rate_bound_isotropic, rate_information
 
 rates = hnp.arrays(float, (3,), elements=st.floats(-40.0, 40.0)).filter(lambda w: np.linalg.norm(w) > 0.1)
 

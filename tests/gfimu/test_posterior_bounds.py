@@ -7,7 +7,7 @@ import pytest
 import scipy.linalg
 
 from gfimu import AccelerometerArray, InputError, SensorErrors, posterior_rate_bound
-from gfimu.rate.bounds.sample import alpha_std, steady_rate_bound
+from gfimu.rate import alpha_std, steady_rate_bound
 
 CUBE = AccelerometerArray.load("cube12")
 NOISE = 0.03
@@ -68,8 +68,7 @@ def test_smoother_equals_the_inverse_of_the_whole_information(noise):
     t = np.arange(n) * period
     errors = SensorErrors.uniform(CUBE, noise, bias)
     bound = posterior_rate_bound(CUBE, t, rates, errors, start_std=0.5, smoother=True)
-    from gfimu.rate.bounds.sample import omega_products_jacobian
-    from gfimu.rate.sensing import ChannelTables
+    from gfimu.rate import ChannelTables, omega_products_jacobian
 
     tables = ChannelTables(CUBE, errors)
     # Unknowns: ω_0, b_α, b_z, ε_0 … ε_{n−1}; everything later is linear in them.

@@ -7,11 +7,11 @@ from every_item import every
 
 import gfimu
 from gfimu import AccelerometerArray, Recording, SensorErrors
+from gfimu.array import Part
 from gfimu.array.linear_solution import linear_solution
-from gfimu.array.parts.part import Part
 from gfimu.base.short_repr import short_repr
 from gfimu.diagnosis.design.distinguishability import Distinguishability
-from sim.chips.data_sheet import DataSheet
+from sim import DataSheet
 from sim.scenarios import Scenario
 from sim.twin import Twin
 

@@ -11,8 +11,7 @@ from hidden_table import SOURCES, Hidden
 
 from gfimu import NamedCause
 from gfimu.diagnosis import Diagnosis, diagnose
-from sim.trials.study.outcome import HiddenWorld, draw_world
-from sim.trials.worlds.z_scores import z_scores
+from sim.trials import HiddenWorld, draw_world, z_scores
 
 WITHIN = 3.0
 """Standard deviations within which every size must lie."""

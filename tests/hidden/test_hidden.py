@@ -9,7 +9,7 @@ from hidden_table import MECHANICAL, MECHANICAL_NAMES, ROWS, SOURCES, TABLE, Hid
 
 from gfimu.diagnosis import diagnose
 from sim.effects import EFFECTS
-from sim.trials.study.outcome import draw_world
+from sim.trials import draw_world
 from sim.twin import Twin
 
 NOT_BY_SIGNATURE = {"bias_random_walk", "coarse_resolution", "cogging", "noise", "saturation", "wrong_range"}

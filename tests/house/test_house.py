@@ -10,7 +10,7 @@ import pytest
 from every_item import every
 
 import gfimu
-from gfimu.model.world_model import BodyModel
+from gfimu.model import BodyModel
 from sim.twin import Twin
 
 from .figures import figures

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gfimu.model.world_model import SpinState
+from gfimu.model import SpinState
 from sim.effects import make_effect
-from sim.trials.worlds.hidden import random_profile
+from sim.trials import random_profile
 from sim.twin import Twin
 
 TWIN = Twin.load("cube12_turntable")

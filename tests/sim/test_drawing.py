@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from gfimu import AccelerometerArray
-from gfimu.base.results.colours import chip_colour
+from gfimu.base import chip_colour
 from gfimu.visual import Box, Cylinder
 from sim.drawing import rig_drawing
 from sim.world import World

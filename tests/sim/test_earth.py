@@ -6,9 +6,9 @@ from scipy.spatial.transform import Rotation
 
 import gfimu
 from gfimu import AccelerometerArray, EarthRotation, local_gravity
-from gfimu.array.gravity import EARTH_RATE
+from gfimu.array import EARTH_RATE
+from sim import BodyState
 from sim.earth import earth_readings
-from sim.motions.motion import BodyState
 from sim.scenarios import Scenario
 from sim.simulation import simulate
 

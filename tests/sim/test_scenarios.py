@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from gfimu import AccelerometerArray, InputError, specific_force
-from gfimu.base.files.model_files import list_models
+from gfimu.base import list_models
 from gfimu.recording import Recording
+from sim import prescribed_readings
 from sim.effects import make_effect
-from sim.rigs.turntable import prescribed_readings
 from sim.scenarios import Scenario
 from sim.simulation import simulate
 

@@ -7,9 +7,8 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from gfimu import AccelerometerArray
-from sim import forward
+from sim import SplineSpin, forward
 from sim.effects import make_effect
-from sim.motions.motion import SplineSpin
 from sim.twin import Twin
 
 T = np.linspace(0.0, 2.0, 40)

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 from scipy.linalg import null_space
 
-from gfimu.recording import Recording
 from gfimu.recording.joining.alignment import align
 from gfimu.recording.joining.join import FAR, Joined, grids, join_reference
 from gfimu.recording.joining.reference_file import ReferenceSeries
+from gfimu.recording.recording import Recording
 
 __all__ = ["displaced_reference"]
 

@@ -7,10 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from firmware_bridge.adxl345.conversion import format_count
-from firmware_bridge.adxl345.device import Adxl345
-from firmware_bridge.adxl345.registers import RAW_PER_COUNT, TICKS_PER_SECOND, Adxl345Options
-from sim.chips.adxl345 import quantise
+from firmware_bridge import RAW_PER_COUNT, TICKS_PER_SECOND, Adxl345, Adxl345Options, format_count
+from sim import quantise
 
 US = TICKS_PER_SECOND // 1_000_000
 MS = 1000 * US

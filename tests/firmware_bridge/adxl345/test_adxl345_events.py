@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from firmware_bridge.adxl345.device import Adxl345
-from firmware_bridge.adxl345.registers import RAW_PER_COUNT, TICKS_PER_SECOND, Adxl345Options
+from firmware_bridge import RAW_PER_COUNT, TICKS_PER_SECOND, Adxl345, Adxl345Options
 
 MS = TICKS_PER_SECOND // 1000
 SINGLE, DOUBLE, ACTIVITY, INACTIVITY, FREE_FALL, DATA_READY = 0x40, 0x20, 0x10, 0x08, 0x04, 0x80

@@ -8,7 +8,7 @@ import pytest
 
 pytest.importorskip("unicorn", reason="the emulator is in the extra 'firmware'")
 
-from firmware_bridge.board.rit import RepetitiveTimer
+from firmware_bridge import RepetitiveTimer
 
 IMAGE = Path(__file__).parents[1] / "images" / "board_parts.c"
 KINDS = ("python", "fast")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from firmware_bridge.adxl345.registers import TICKS_PER_SECOND
+from firmware_bridge import TICKS_PER_SECOND
 from firmware_bridge.board.gpdma import Gpdma
 from firmware_bridge.board.peripheral import NEVER
 from firmware_bridge.board.timer import Timer

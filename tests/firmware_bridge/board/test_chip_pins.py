@@ -9,10 +9,7 @@ import pytest
 
 pytest.importorskip("unicorn", reason="the emulator is in the extra 'firmware'")
 
-from firmware_bridge.adxl345.device import Adxl345
-from firmware_bridge.adxl345.registers import TICKS_PER_SECOND, Adxl345Options
-from firmware_bridge.board.board import Board
-from firmware_bridge.board.fast_board import FastBoard
+from firmware_bridge import TICKS_PER_SECOND, Adxl345, Adxl345Options, Board, FastBoard
 
 KINDS = {"python": Board, "fast": FastBoard}
 IMAGE = Path(__file__).parents[1] / "images" / "chip_events.c"

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from firmware_bridge.frames.continuity import Continuity
-from firmware_bridge.frames.decoder import FORMATS, SampleDecoder, encode_samples
+from firmware_bridge import FORMATS, Continuity, SampleDecoder, encode_samples
 
 PACKET = np.dtype([("sequence", "<u2"), ("ticks", "<u4")])
 PERIOD = 1000.0  # ticks, the longest

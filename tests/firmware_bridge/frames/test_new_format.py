@@ -10,10 +10,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from firmware_bridge import FORMATS, SampleDecoder, record
 from firmware_bridge.frames.commands import Dialogue, Identity, Reply, Result, set_rate
-from firmware_bridge.frames.decoder import FORMATS, FrameFormat, SampleDecoder, frame_format
+from firmware_bridge.frames.decoder import FrameFormat, frame_format
 from firmware_bridge.frames.packets import PacketLayout
-from firmware_bridge.host.recorder import record
 from gfimu import InputError
 from gfimu.recording import Recording
 

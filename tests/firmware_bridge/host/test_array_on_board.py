@@ -11,12 +11,11 @@ from typing import Self
 import numpy as np
 import pytest
 
+from firmware_bridge import FORMATS, SampleDecoder, TcpPort, encode_samples
+from firmware_bridge import record as record_port
 from firmware_bridge.frames.commands import ArrayName, Command, FrameType, parse_message
-from firmware_bridge.frames.decoder import SampleDecoder, encode_message, encode_samples
-from firmware_bridge.frames.frame_format import FORMATS
+from firmware_bridge.frames.decoder import encode_message
 from firmware_bridge.host.mounting.on_board import candidate_arrays, mounting_words
-from firmware_bridge.host.recorder import record as record_port
-from firmware_bridge.loop.virtual_port import TcpPort
 from gfimu import AccelerometerArray, BoardSettings, InputError, RecordCallbacks, RecordingWarning, record
 from gfimu.recording import Recording
 from sim.scenarios import Scenario

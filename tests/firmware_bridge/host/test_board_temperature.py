@@ -9,9 +9,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from firmware_bridge.loop.virtual_port import TcpPort
+from firmware_bridge import TcpPort
 from gfimu import BoardSettings, calibrate, check, inspect, record
-from gfimu.commands.shell.printing import print_blocks
+from gfimu.commands import print_blocks
 from gfimu.recording import Recording
 from sim.scenarios import Scenario
 from sim.simulation import simulate

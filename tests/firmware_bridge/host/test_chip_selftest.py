@@ -7,8 +7,8 @@ import threading
 import numpy as np
 import pytest
 
+from firmware_bridge import open_port, serve
 from firmware_bridge.host.chip_selftest import check_chips, judge
-from firmware_bridge.loop.virtual_port import open_port, serve
 from gfimu import InputError
 
 CHANNELS = tuple(f"a{chip}{axis}" for chip in (1, 2) for axis in (1, 2, 3))
@@ -39,8 +39,8 @@ def test_a_chip_without_readings_and_a_unit_that_moves() -> None:
 
 def test_over_a_port_with_a_chip_that_is_silent() -> None:
     pytest.importorskip("unicorn", reason="the emulator is in the extra 'firmware'")
+    from firmware_bridge import BoardProcess
     from firmware_bridge.adxl345.registers import DATA_FORMAT, SELF_TEST, LineFault
-    from firmware_bridge.loop.board_process import BoardProcess
 
     port, done = open_port("tcp:0"), threading.Event()
     with BoardProcess() as board:

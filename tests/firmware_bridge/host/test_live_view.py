@@ -15,7 +15,7 @@ from firmware_bridge.host.live import LiveView
 from firmware_bridge.host.recorder import Batch
 from firmware_bridge.host.stream_meter import GroupMeans, StreamMeter
 from gfimu import AccelerometerArray, LiveRateFilter, SensorErrors
-from gfimu.rate.health.fault import HealthCode
+from gfimu.rate import HealthCode
 from gfimu.rate.health.live import background
 from gfimu.rate.health.live.background import BackgroundFilter
 

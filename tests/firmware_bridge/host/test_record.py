@@ -14,11 +14,10 @@ from contextlib import contextmanager, suppress
 import numpy as np
 import pytest
 
+from firmware_bridge import encode_samples, open_port, record, serve
 from firmware_bridge.frames.commands import Command, encode_command, set_range, set_rate
-from firmware_bridge.frames.decoder import encode_samples
 from firmware_bridge.host.link import Link
-from firmware_bridge.host.recorder import SampleClock, record
-from firmware_bridge.loop.virtual_port import open_port, serve
+from firmware_bridge.host.recorder import SampleClock
 from gfimu import AccelerometerArray, GfimuError, InputError
 from gfimu.recording import Recording
 
@@ -29,7 +28,7 @@ needs_board = pytest.mark.skipif(
 
 @contextmanager
 def served_board(port_name: str, **options):
-    from firmware_bridge.loop.board_process import BoardProcess
+    from firmware_bridge import BoardProcess
 
     port = open_port(port_name)
     done = threading.Event()
@@ -165,7 +164,7 @@ def test_a_link_that_stays_away_ends_the_recording_and_keeps_what_came(server: S
 
 
 def test_restart_of_the_board_is_one_gap_in_a_time_that_never_goes_back() -> None:
-    from firmware_bridge.frames.decoder import SampleDecoder
+    from firmware_bridge import SampleDecoder
 
     decoder, clock = SampleDecoder(), SampleClock(1e6)
     before = clock.place(decoder.feed(frames(40_000, 800)), 100.0)

@@ -13,12 +13,11 @@ import time
 import numpy as np
 import pytest
 
-from firmware_bridge.frames.decoder import encode_samples
+from firmware_bridge import Journal, encode_samples, record
 from firmware_bridge.host import journal
 from firmware_bridge.host.clock import ClockFit
-from firmware_bridge.host.journal import Journal, JournalError
+from firmware_bridge.host.journal import JournalError
 from firmware_bridge.host.link import Link
-from firmware_bridge.host.recorder import record
 from firmware_bridge.loop.virtual_port import PseudoTerminal
 from gfimu import GfimuError, InputError
 from gfimu.recording import Recording
@@ -64,7 +63,7 @@ class Feed:
 
 @pytest.fixture
 def feed():
-    from firmware_bridge.loop.virtual_port import TcpPort
+    from firmware_bridge import TcpPort
 
     opened = Feed(TcpPort(0))
     yield opened

@@ -9,14 +9,12 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 
+from firmware_bridge import as_received, open_port, record, serve
 from firmware_bridge.frames.commands import Command, encode_command, set_rate
 from firmware_bridge.frames.decoder import frame_format
 from firmware_bridge.host.finder import find_boards
 from firmware_bridge.host.line_up import change_speed
 from firmware_bridge.host.link import Link
-from firmware_bridge.host.recorder import record
-from firmware_bridge.loop.line_speed import as_received
-from firmware_bridge.loop.virtual_port import open_port, serve
 from gfimu import InputError
 from gfimu.recording import Recording
 
@@ -29,7 +27,7 @@ needs_board = pytest.mark.skipif(
 @contextmanager
 def served(*commands: bytes, port_name: str = "pty"):
     """A board in real time behind a port; gives the board and the port."""
-    from firmware_bridge.loop.board_process import BoardProcess
+    from firmware_bridge import BoardProcess
 
     port = open_port(port_name)
     done = threading.Event()

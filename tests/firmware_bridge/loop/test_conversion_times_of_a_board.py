@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 
 pytest.importorskip("unicorn", reason="the emulator is in the extra 'firmware'")
 
-from firmware_bridge.adxl345.registers import Adxl345Options
+from firmware_bridge import Adxl345Options, record_virtual
 from firmware_bridge.frames.commands import RATE_CODE_AUTO, Identity
-from firmware_bridge.loop.virtual_run import record_virtual
 from gfimu import AccelerometerArray
-from gfimu.base.units import STANDARD_GRAVITY
-from gfimu.recording.timing.conversion_times import conversion_times
+from gfimu.base import STANDARD_GRAVITY
+from gfimu.recording import conversion_times
 from sim.chips.adxl345 import SensorErrors
 
 LARGEST = 15.9 * STANDARD_GRAVITY

@@ -10,9 +10,7 @@ import pytest
 
 pytest.importorskip("unicorn", reason="the emulator is in the extra 'firmware'")
 
-from firmware_bridge.adxl345.registers import Adxl345Options
-from firmware_bridge.loop.virtual_run import record_virtual
-from firmware_bridge.lpc1768.build import build
+from firmware_bridge import Adxl345Options, build, record_virtual
 from gfimu import Diagnosis
 from gfimu.diagnosis import diagnose
 from gfimu.recording import Recording

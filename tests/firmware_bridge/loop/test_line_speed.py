@@ -8,7 +8,7 @@ import sys
 import pytest
 import serial
 
-from firmware_bridge.loop.line_speed import as_received, terminal_baud
+from firmware_bridge import as_received, terminal_baud
 
 
 def test_the_right_speed_changes_nothing() -> None:

@@ -8,8 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from firmware_bridge.adxl345.registers import TICKS_PER_SECOND
-from firmware_bridge.loop.virtual_port import open_port, serve
+from firmware_bridge import TICKS_PER_SECOND, open_port, serve
 from gfimu import BoardSettings, RecordCallbacks, record
 from gfimu.recording import Recording
 
@@ -37,7 +36,7 @@ class FaultyChip:
 
 @needs_board
 def test_a_chip_that_goes_wrong_is_named_while_recording(tmp_path) -> None:
-    from firmware_bridge.loop.board_process import BoardProcess
+    from firmware_bridge import BoardProcess
 
     port, done, sentences = open_port("tcp:0"), threading.Event(), []
     with BoardProcess(FaultyChip(20)) as board:

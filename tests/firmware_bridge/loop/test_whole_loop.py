@@ -10,20 +10,26 @@ import pytest
 
 pytest.importorskip("unicorn", reason="the emulator is in the extra 'firmware'")
 
-from firmware_bridge.adxl345.conversion import format_count
-from firmware_bridge.adxl345.registers import TICKS_PER_SECOND, Adxl345Options
+from firmware_bridge import (
+    TICKS_PER_SECOND,
+    Adxl345Options,
+    BoardProcess,
+    SampleDecoder,
+    format_count,
+    open_port,
+    record,
+    record_virtual,
+    serve,
+)
 from firmware_bridge.frames.commands import sample_at, set_rate
-from firmware_bridge.frames.decoder import SampleDecoder, Status
-from firmware_bridge.host.recorder import record
-from firmware_bridge.loop.board_process import BoardProcess
+from firmware_bridge.frames.decoder import Status
 from firmware_bridge.loop.physics import RidePhysics
-from firmware_bridge.loop.virtual_port import open_port, serve
-from firmware_bridge.loop.virtual_run import record_virtual, typical_chips
+from firmware_bridge.loop.virtual_run import typical_chips
 from gfimu import AccelerometerArray, InputError
 from gfimu.motion.estimation import estimate
 from gfimu.recording import Recording
+from sim import prescribed_readings
 from sim.ride import Ride
-from sim.rigs.turntable import prescribed_readings
 from sim.scenarios import Scenario
 from sim.simulation import simulate
 

@@ -9,10 +9,7 @@ pytest.importorskip("unicorn", reason="the emulator is in the extra 'firmware'")
 
 from unicorn.arm_const import UC_ARM_REG_PRIMASK
 
-from firmware_bridge.adxl345.device import Adxl345
-from firmware_bridge.adxl345.registers import RAW_PER_COUNT, Adxl345Options
-from firmware_bridge.board.board import Board
-from firmware_bridge.board.fast_board import FastBoard
+from firmware_bridge import RAW_PER_COUNT, Adxl345, Adxl345Options, Board, FastBoard, SampleDecoder, image_path
 from firmware_bridge.board.nvic import FIRST_IRQ
 from firmware_bridge.frames.commands import (
     FAST_BAUD,
@@ -24,8 +21,7 @@ from firmware_bridge.frames.commands import (
     set_range,
     set_rate,
 )
-from firmware_bridge.frames.decoder import SampleDecoder, Status
-from firmware_bridge.lpc1768.build import image_path
+from firmware_bridge.frames.decoder import Status
 from firmware_bridge.lpc1768.elf import ElfImage
 from firmware_bridge.strict.board import StrictBoard
 

@@ -9,6 +9,7 @@ import pytest
 
 pytest.importorskip("unicorn", reason="the emulator is in the extra 'firmware'")
 
+from firmware_bridge import SampleDecoder
 from firmware_bridge.frames.checksum import crc16
 from firmware_bridge.frames.commands import (
     FAST_BAUD,
@@ -22,7 +23,7 @@ from firmware_bridge.frames.commands import (
     set_range,
     set_rate,
 )
-from firmware_bridge.frames.decoder import SampleDecoder, Samples, Status
+from firmware_bridge.frames.decoder import Samples, Status
 from gfimu import InputError
 
 KINDS = ("python", "fast")

@@ -9,8 +9,8 @@ import pytest
 
 pytest.importorskip("ziglang", reason="the C compiler is in the extra 'firmware'")
 
-from firmware_bridge.adxl345.device import Adxl345
-from firmware_bridge.adxl345.registers import RAW_PER_COUNT, TICKS_PER_SECOND, Adxl345Options, LineFault
+from firmware_bridge import RAW_PER_COUNT, TICKS_PER_SECOND, Adxl345, Adxl345Options, SampleDecoder
+from firmware_bridge.adxl345.registers import LineFault
 from firmware_bridge.frames.checksum import crc16
 from firmware_bridge.frames.commands import (
     ArrayName,
@@ -23,7 +23,7 @@ from firmware_bridge.frames.commands import (
     set_range,
     set_rate,
 )
-from firmware_bridge.frames.decoder import SampleDecoder, Samples, Status
+from firmware_bridge.frames.decoder import Samples, Status
 from firmware_bridge.lpc1768.build import build_host_library
 
 US = TICKS_PER_SECOND // 1_000_000

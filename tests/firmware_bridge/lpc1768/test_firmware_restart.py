@@ -9,13 +9,11 @@ import pytest
 
 pytest.importorskip("unicorn", reason="the emulator is in the extra 'firmware'")
 
-from firmware_bridge.adxl345.registers import TICKS_PER_SECOND
+from firmware_bridge import TICKS_PER_SECOND, BoardProcess, SampleDecoder, record_virtual
 from firmware_bridge.board.nvic import FIRST_IRQ
 from firmware_bridge.board.ssp import Ssp
 from firmware_bridge.frames.commands import Command, Identity, encode_command, parse_message
-from firmware_bridge.frames.decoder import SampleDecoder, Status
-from firmware_bridge.loop.board_process import BoardProcess
-from firmware_bridge.loop.virtual_run import record_virtual
+from firmware_bridge.frames.decoder import Status
 from firmware_bridge.lpc1768 import build as firmware
 from firmware_bridge.lpc1768.elf import ElfImage
 from sim.ride import Ride

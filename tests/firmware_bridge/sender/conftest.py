@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from firmware_bridge.sender.project import write_project
+from firmware_bridge import write_project
 
 STRICT = ("-std=c11", "-O2", "-Wall", "-Wextra", "-Wconversion", "-Werror")
 BARE = ("-ffreestanding", "-fno-builtin", "-fno-sanitize=undefined", "-fno-unwind-tables",

@@ -8,7 +8,7 @@ import time
 import numpy as np
 import pytest
 
-from firmware_bridge.host.recorder import record
+from firmware_bridge import record
 from firmware_bridge.sources import klipper
 from gfimu import InputError
 from gfimu.recording import Recording

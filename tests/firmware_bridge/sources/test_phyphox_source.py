@@ -11,7 +11,7 @@ from urllib.parse import parse_qsl, urlsplit
 import numpy as np
 import pytest
 
-from firmware_bridge.host.recorder import record
+from firmware_bridge import record
 from gfimu import InputError
 from gfimu.recording import Recording
 

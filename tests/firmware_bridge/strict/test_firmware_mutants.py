@@ -13,7 +13,7 @@ import pytest
 pytest.importorskip("unicorn", reason="the emulator is in the extra 'firmware'")
 pytest.importorskip("ziglang", reason="the C compiler is in the extra 'firmware'")
 
-from firmware_bridge.adxl345.device import Adxl345
+from firmware_bridge import Adxl345
 from firmware_bridge.lpc1768 import build as firmware
 from firmware_bridge.lpc1768.elf import ElfImage
 from firmware_bridge.strict.board import StrictBoard

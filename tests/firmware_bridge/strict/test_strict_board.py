@@ -11,9 +11,8 @@ import pytest
 
 pytest.importorskip("unicorn", reason="the emulator is in the extra 'firmware'")
 
-from firmware_bridge.adxl345.device import Adxl345
+from firmware_bridge import Adxl345, image_path
 from firmware_bridge.frames.commands import Command, encode_command, set_range, set_rate
-from firmware_bridge.lpc1768.build import image_path
 from firmware_bridge.lpc1768.elf import ElfImage, Segment
 from firmware_bridge.strict.board import STUCK, StrictBoard
 from firmware_bridge.strict.check import CheckOptions, check_image

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from gfimu import AccelerometerArray, InputError
-from gfimu.array.array import OMEGA_PRODUCTS
-from gfimu.array.kinematics import ALTERNATE_CORNERS, omega_products
-from gfimu.base.files.model_files import list_models
+from gfimu.array import ALTERNATE_CORNERS, OMEGA_PRODUCTS, omega_products
+from gfimu.base import list_models
 
 SHIPPED = list_models("arrays")
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gfimu import AccelerometerArray, GeometryError, InputError, specific_force
-from gfimu.array.kinematics import omega_products
+from gfimu.array import omega_products
 from gfimu.array.linear_solution import linear_solution
 
 FORM_OF = {

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from gfimu import AccelerometerArray, Chip, GeometryError, InputError, gdop
+from gfimu.array import seeing_arrays
 from gfimu.array.dilution import gdop_lower_bound
-from gfimu.array.observability import seeing_arrays
 from gfimu.array_search.scoring import ranking_remark, score
 
 # Lengths in units of half the cube's edge. κ and GDOP of the tetrahedral cube: GF-IMU paper (1.414, 1.061); the rest

@@ -14,7 +14,7 @@ from gfimu.array_search.polish import _objective, _Variables, alpha_leakage, lea
 from gfimu.array_search.problem import Design, Problem, Tolerance, rows_of, slopes_by_design
 from gfimu.array_search.scoring import score
 from gfimu.array_search.shapes import box, frames_across
-from gfimu.rate.bounds.sample import alpha_std
+from gfimu.rate import alpha_std
 from gfimu.rate.health.detectable import detectable_faults
 
 CUBE = box((0.1, 0.1, 0.1))

@@ -4,8 +4,7 @@ import itertools
 
 import numpy as np
 
-from gfimu.calibration.error_model import ErrorModel
-from gfimu.calibration.observations import Observations
+from gfimu.calibration import ErrorModel, Observations
 
 GRAVITY = 9.81
 FACES = np.concatenate([np.eye(3), -np.eye(3)])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gfimu.calibration.error_model import ErrorModel
+from gfimu.calibration import ErrorModel
 
 
 @pytest.fixture

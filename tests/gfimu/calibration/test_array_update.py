@@ -8,10 +8,9 @@ from calibration_cases import CORNERS, EDGES, FACES, GRAVITY, MULTI, assert_hone
 from recordings import pose_recording
 
 from gfimu import AccelerometerArray, InputError, UnitError, calibrate_array, update_array_calibration
+from gfimu.calibration import ErrorModel, Observations
 from gfimu.calibration.array_static import apparent_alpha, array_static, body_specific_force
 from gfimu.calibration.array_update import array_update
-from gfimu.calibration.error_model import ErrorModel
-from gfimu.calibration.observations import Observations
 
 CUBE = AccelerometerArray.load("cube12")
 TURN_ON = 0.03

@@ -10,8 +10,7 @@ from gfimu import AccelerometerArray, Calibration, InputError, UnitError, load_c
 from gfimu.calibration.combine import combine
 from gfimu.calibration.parameter_names import parameter_names
 from gfimu.calibration.run_file import open_calibrated_run
-from gfimu.recording import Recording
-from gfimu.recording.carried_array import array_difference
+from gfimu.recording import Recording, array_difference
 
 
 @pytest.fixture

@@ -5,8 +5,7 @@ import pytest
 
 import gfimu
 from gfimu import InputError
-from gfimu.calibration.check_poses import check_on_poses
-from gfimu.calibration.error_model import ErrorModel
+from gfimu.calibration import ErrorModel, check_on_poses
 from gfimu.recording import Recording
 
 GRAVITY = 9.80665

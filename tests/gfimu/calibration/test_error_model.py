@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 
 from gfimu import InputError
-from gfimu.calibration.error_model import ErrorModel, free_elements
+from gfimu.calibration import ErrorModel, free_elements
 
 matrices = st.lists(st.floats(-0.2, 0.2), min_size=9, max_size=9).map(
     lambda values: np.eye(3) + np.array(values).reshape(3, 3)

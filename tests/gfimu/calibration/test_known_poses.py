@@ -3,8 +3,7 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from gfimu.calibration.error_model import ErrorModel
-from gfimu.calibration.known_poses import levelling_covariance
+from gfimu.calibration import ErrorModel, levelling_covariance
 
 
 def test_the_covariance_of_each_row_is_that_of_readings_at_tilted_poses():

@@ -6,10 +6,9 @@ from calibration_cases import EDGES, FACES, GRAVITY, MULTI, TWELVE, simulate
 from scipy.optimize import least_squares
 
 from gfimu import InputError
-from gfimu.calibration.error_model import ErrorModel
+from gfimu.calibration import ErrorModel, Observations
 from gfimu.calibration.gauss_helmert import gauss_helmert
 from gfimu.calibration.multi_position import magnitude_condition, multi_position
-from gfimu.calibration.observations import Observations
 from gfimu.calibration.recursive import RecursiveCalibrator, recursive
 from gfimu.calibration.six_position import six_position
 from gfimu.calibration.twelve_position import coarse_solution, rotation_directions, twelve_position

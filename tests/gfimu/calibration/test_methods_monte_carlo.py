@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 from calibration_cases import FACES, GRAVITY, MULTI, TWELVE, assert_honest, simulate
 
-from gfimu.array.gravity import EARTH_RATE
-from gfimu.calibration.error_model import ErrorModel
+from gfimu.array import EARTH_RATE
+from gfimu.calibration import ErrorModel, Observations
 from gfimu.calibration.multi_position import multi_position, multi_position_gyro
-from gfimu.calibration.observations import Observations
 from gfimu.calibration.recursive import recursive
 from gfimu.calibration.six_position import six_position
 from gfimu.calibration.twelve_position import twelve_position

@@ -9,8 +9,8 @@ import pytest
 from calibration_cases import GRAVITY, MULTI, chips_in_gauge, poses_of, simulate
 
 from gfimu import AccelerometerArray
+from gfimu.calibration import ErrorModel
 from gfimu.calibration.array_static import array_static, bias_places, same_specific_force
-from gfimu.calibration.error_model import ErrorModel
 from gfimu.calibration.fit_quality import covariance_scale, mean_factor
 from gfimu.calibration.multi_position import magnitude_condition, multi_position
 from gfimu.calibration.nonlinearity import quadratic_std, with_quadratic, without_quadratic

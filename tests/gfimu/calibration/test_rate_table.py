@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import binom
 
 from gfimu import CalibrationPoses, InputError, Latitude, RateTable, Recording, calibrate
-from gfimu.array.gravity import EARTH_RATE
+from gfimu.array import EARTH_RATE
 from gfimu.calibration.rate_table import Plateaus, body_axis, find_plateaus, rate_table_gyro
 
 M = np.array([[1.02, 0.004, -0.003], [0.002, 0.98, 0.005], [-0.006, 0.001, 1.01]])

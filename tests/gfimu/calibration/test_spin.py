@@ -8,8 +8,7 @@ import spin_cases
 from spin_cases import CUBE, ON_ITS_SIDE, Unit, normalised_errors
 
 from gfimu import Calibration, InputError, UnitError, load_calibration
-from gfimu.calibration.certificate.certify import certify
-from gfimu.calibration.error_model import ErrorModel
+from gfimu.calibration import ErrorModel, certify
 from gfimu.calibration.nonlinearity import cubic_std
 from gfimu.calibration.spin import SpinPolicy, spin
 from gfimu.calibration.spin.model import Geometry, SpinGeometry, read_plateaus

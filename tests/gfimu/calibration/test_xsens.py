@@ -10,7 +10,7 @@ from gfimu.calibration.imu_tk import read_text_triad
 from gfimu.calibration.methods import calibrate
 from gfimu.calibration.multi_position import multi_position
 from gfimu.calibration.observations import averaged_poses, every_sample
-from gfimu.recording.rest import detect_rest
+from gfimu.recording import detect_rest
 
 GRAVITY = 9.81744
 FACTORY_SCALE = [415.0, 413.0, 415.0]

@@ -13,7 +13,7 @@ from gfimu import Diagnosis, NamedCause
 from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.verdict.parts import NoiseLevels, Residual, Unexplained
 from gfimu.recording.joining import ReferenceSeries
-from sim.trials.worlds.hidden import Measurement, measure
+from sim.trials import Measurement, measure
 from sim.twin import Twin
 
 TWIN = Twin.load("cube12_turntable")

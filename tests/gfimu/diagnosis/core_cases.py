@@ -12,17 +12,13 @@ from scipy.interpolate import CubicSpline
 from scipy.linalg import block_diag, cho_factor, cho_solve
 
 from gfimu import AccelerometerArray
-from gfimu.diagnosis.data.cosine_basis import NoiseLevels
-from gfimu.diagnosis.data.run import prepare_run
-from gfimu.diagnosis.data.stretch import Stretch, make_stretches
-from gfimu.diagnosis.data.table.spins import State
-from gfimu.diagnosis.terms.cause import Cause
-from gfimu.diagnosis.terms.columns import Columns
-from gfimu.diagnosis.terms.drive import Drive
+from gfimu.diagnosis import Cause, Columns, Drive, NoiseLevels, State, make_stretches, prepare_run
+from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.model.world_model import Effect, Spin
+from sim import SplineSpin
 from sim.effects import EFFECTS
-from sim.motions.motion import SpinMotion, SplineSpin
-from sim.trials.worlds.hidden import Measurement, measure
+from sim.motions.motion import SpinMotion
+from sim.trials import Measurement, measure
 from sim.twin import Twin
 
 

@@ -7,11 +7,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from gfimu import Diagnosis, NamedCause
+from gfimu.diagnosis import RunView
 from gfimu.diagnosis.criticism.gain import Gain
-from gfimu.diagnosis.criticism.views.run_view import RunView
 from gfimu.diagnosis.verdict.parts import NoiseLevels, Residual, Rival, Unexplained
 from sim.effects import Effect, make_effect
-from sim.trials.worlds.hidden import Measurement, measure, random_profile
+from sim.trials import Measurement, measure, random_profile
 from sim.twin import Twin
 
 SETTING = Measurement(duration=40.0)

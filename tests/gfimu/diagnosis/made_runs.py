@@ -6,8 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gfimu.diagnosis.criticism.views.run_view import RunView
-from gfimu.diagnosis.data.run import Run
+from gfimu.diagnosis import Run, RunView
 
 PERIOD = 0.01  # s
 SIGMA = 0.05  # m/s², white noise

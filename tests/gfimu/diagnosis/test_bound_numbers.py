@@ -9,12 +9,10 @@ import pytest
 from usual_twin import UsualTwin
 
 from gfimu import AccelerometerArray
-from gfimu.diagnosis import diagnose
-from gfimu.diagnosis.report.plain_words import headline
-from gfimu.diagnosis.verdict.parts import Unlisted
+from gfimu.diagnosis import Unlisted, diagnose, headline
 from gfimu.recording import Recording
 from sim.effects import make_effect
-from sim.trials.worlds.hidden import Measurement, measure
+from sim.trials import Measurement, measure
 from sim.twin import Twin
 
 TWIN = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")

@@ -6,16 +6,11 @@ import numpy as np
 import pytest
 
 from gfimu import AccelerometerArray
-from gfimu.diagnosis import diagnose
+from gfimu.diagnosis import Policy, diagnose, make_stretches, prepare, understand
 from gfimu.diagnosis.criticism import holdout
-from gfimu.diagnosis.data.stretch import make_stretches
-from gfimu.diagnosis.diagnose import prepare
-from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.search.nuisance_models import understand
 from sim.effects import EFFECTS, make_effect
-from sim.trials.study.cases import Case, study_cases
-from sim.trials.study.outcome import draw_world
-from sim.trials.worlds.hidden import Measurement, measure
+from sim.trials import Case, Measurement, draw_world, measure
+from sim.trials.study.cases import study_cases
 from sim.twin import Twin
 
 TWIN = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")

@@ -8,15 +8,9 @@ import pytest
 from rerun.chunk import RrdReader
 
 from gfimu import InputError
-from gfimu.base.files.model_files import find_model, read_toml
-from gfimu.diagnosis import diagnose
-from gfimu.diagnosis.data.body.run import prepare_body_run
-from gfimu.diagnosis.data.body.stretch import make_body_stretches
-from gfimu.diagnosis.diagnose import prepare
-from gfimu.diagnosis.report.picture import write_picture
-from gfimu.diagnosis.terms.hand.drive import HandDrive
-from gfimu.motion.attitude import to_rotation
-from gfimu.motion.body_drive import BodyDrive
+from gfimu.base import find_model, read_toml
+from gfimu.diagnosis import HandDrive, diagnose, make_body_stretches, prepare, prepare_body_run, write_picture
+from gfimu.motion import BodyDrive, to_rotation
 from sim.effects import BODY_EFFECTS, EFFECTS, NOT_OF_A_BODY
 from sim.scenarios import Scenario
 from sim.simulation import simulate

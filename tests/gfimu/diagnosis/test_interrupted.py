@@ -8,11 +8,9 @@ import pytest
 
 import gfimu
 from gfimu import AccelerometerArray, InputError
-from gfimu.diagnosis import diagnose
-from gfimu.diagnosis.report.plain_words import headline, next_steps
-from gfimu.diagnosis.time_limit import limited_to
+from gfimu.diagnosis import diagnose, headline, limited_to, next_steps
 from sim.effects import make_effect
-from sim.trials.worlds.hidden import Measurement, measure
+from sim.trials import Measurement, measure
 from sim.twin import Twin
 
 TWIN = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")

@@ -9,17 +9,13 @@ import pytest
 from usual_twin import UsualTwin
 
 from gfimu import AccelerometerArray
-from gfimu.base.units import STANDARD_GRAVITY
-from gfimu.diagnosis import diagnose
+from gfimu.base import STANDARD_GRAVITY
+from gfimu.diagnosis import Policy, diagnose, make_stretches, prepare, starting_point
 from gfimu.diagnosis.criticism.series_tests import lines
-from gfimu.diagnosis.data.stretch import make_stretches
-from gfimu.diagnosis.diagnose import prepare
-from gfimu.diagnosis.fit.learn import starting_point
 from gfimu.diagnosis.fit.observed_at import observed_at
-from gfimu.diagnosis.policy import Policy
 from gfimu.recording import Recording
 from sim.effects import make_effect
-from sim.trials.worlds.hidden import Measurement, measure
+from sim.trials import Measurement, measure
 from sim.twin import Twin
 
 SETTING = Measurement(duration=24.0)

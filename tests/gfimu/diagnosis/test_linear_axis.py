@@ -7,11 +7,7 @@ import pytest
 
 import gfimu
 from gfimu import InputError
-from gfimu.diagnosis.design.run_check import check_runs
-from gfimu.diagnosis.diagnose import prepare
-from gfimu.diagnosis.fit.learn import starting_point
-from gfimu.diagnosis.one_library import stretches_of
-from gfimu.diagnosis.policy import Policy
+from gfimu.diagnosis import Policy, check_runs, prepare, starting_point, stretches_of
 from sim.effects import make_effect
 from sim.scenarios import Scenario
 from sim.twin import Twin

@@ -7,15 +7,12 @@ import pytest
 from usual_twin import UsualTwin
 
 from gfimu import AccelerometerArray
-from gfimu.diagnosis import diagnose
+from gfimu.diagnosis import Policy, diagnose, prepare_run, spread_over_runs, understand_any_length
 from gfimu.diagnosis.data import stretch
-from gfimu.diagnosis.data.run import prepare_run
-from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search import long_run
-from gfimu.diagnosis.search.long_run import spread_over_runs, understand_any_length
 from gfimu.recording import Recording
 from sim.effects import make_effect
-from sim.trials.worlds.hidden import Measurement, measure, random_profile
+from sim.trials import Measurement, measure, random_profile
 from sim.twin import Twin
 
 FEW = Policy(most_searched=2)

@@ -10,17 +10,13 @@ from made_diagnoses import made_diagnosis
 from usual_twin import UsualTwin
 
 from gfimu import AccelerometerArray, InputError, NamedCause
-from gfimu.diagnosis import diagnose
-from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.report.page import report_html
-from gfimu.diagnosis.report.plain_words import headline
+from gfimu.diagnosis import Policy, diagnose, headline, report_html
 from gfimu.diagnosis.verdict.naming import capped
 from gfimu.diagnosis.verdict.wording import verdict_sentences
 from gfimu.recording import Recording
 from sim.effects import make_effect
+from sim.trials import Measurement, draw_world, measure, random_profile
 from sim.trials.study.cases import study_cases
-from sim.trials.study.outcome import draw_world
-from sim.trials.worlds.hidden import Measurement, measure, random_profile
 
 SETTING = Measurement(duration=24.0)
 

@@ -14,8 +14,8 @@ from every_item import every
 from scipy.stats import norm
 
 import gfimu.diagnosis
-from gfimu.base.units import STANDARD_GRAVITY
-from gfimu.diagnosis.policy import Policy
+from gfimu.base import STANDARD_GRAVITY
+from gfimu.diagnosis import Policy
 
 FOLDER = Path(gfimu.diagnosis.__file__).parent
 FIELDS = [one.name for one in dataclasses.fields(Policy)]

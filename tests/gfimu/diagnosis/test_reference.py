@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 
 from gfimu import AccelerometerArray, InputError
-from gfimu.diagnosis import diagnose
-from gfimu.diagnosis.data.run import prepare_run
+from gfimu.diagnosis import diagnose, prepare_run
 from gfimu.recording import Recording
 from sim.effects import EFFECTS, ENCODER_EFFECTS, NOT_OF_AN_ENCODER, Effect
-from sim.trials.worlds.hidden import Measurement, hidden_effect, measure, random_profile
+from sim.trials import Measurement, hidden_effect, measure, random_profile
 from sim.twin import Twin
 
 SETTING = Measurement(duration=26.0)

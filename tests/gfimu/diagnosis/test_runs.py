@@ -9,19 +9,22 @@ import pytest
 from numpy.testing import assert_allclose
 
 from gfimu import AccelerometerArray
-from gfimu.base.units import STANDARD_GRAVITY
-from gfimu.diagnosis import diagnose
+from gfimu.base import STANDARD_GRAVITY
+from gfimu.diagnosis import (
+    Policy,
+    check_integrity,
+    diagnose,
+    make_stretches,
+    predicted_by_reference,
+    prepare_run,
+    starting_point,
+)
 from gfimu.diagnosis.criticism.holdout import split
-from gfimu.diagnosis.data.integrity import check_integrity
-from gfimu.diagnosis.data.run import prepare_run
-from gfimu.diagnosis.data.stretch import make_stretches
 from gfimu.diagnosis.fit.gauss_newton import fit
-from gfimu.diagnosis.fit.learn import predicted_by_reference, starting_point
-from gfimu.diagnosis.policy import Policy
 from gfimu.recording import Recording
 from sim.effects import make_effect
 from sim.motions.profiles import Hold, Ramp, spin_profile
-from sim.trials.worlds.hidden import Measurement, hidden_effect, measure, random_profile
+from sim.trials import Measurement, hidden_effect, measure, random_profile
 from sim.twin import Twin
 
 SETTING = Measurement(duration=24.0)

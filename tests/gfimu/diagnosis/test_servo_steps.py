@@ -9,9 +9,9 @@ import pytest
 
 from gfimu import AccelerometerArray
 from gfimu.diagnosis import diagnose
+from sim import SpinState, SplineSpin
 from sim.effects import make_effect
-from sim.motions.motion import SpinState, SplineSpin
-from sim.trials.worlds.hidden import Measurement, measure
+from sim.trials import Measurement, measure
 from sim.twin import Twin
 
 DURATION = 14.0

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from gfimu.diagnosis.data.body.gyro import smooth_gyro
+from gfimu.diagnosis import smooth_gyro
 
 T = 0.01
 NOISE = 2e-3

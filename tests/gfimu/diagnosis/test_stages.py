@@ -9,7 +9,7 @@ import pytest
 
 from gfimu import AccelerometerArray, NamedCause
 from gfimu.diagnosis import diagnose
-from sim.trials.worlds.hidden import Measurement, measure
+from sim.trials import Measurement, measure
 from sim.twin import Twin
 
 TWIN = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")

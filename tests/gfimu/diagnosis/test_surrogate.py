@@ -7,12 +7,10 @@ import pytest
 from usual_twin import UsualTwin
 
 from gfimu import AccelerometerArray, InputError
-from gfimu.diagnosis import diagnose
-from gfimu.diagnosis.report.folder import write_diagnosis
-from gfimu.diagnosis.report.plain_words import story
+from gfimu.diagnosis import diagnose, story, write_diagnosis
 from gfimu.recording import Recording
 from sim.effects import make_effect
-from sim.trials.worlds.hidden import Measurement, measure, random_profile
+from sim.trials import Measurement, measure, random_profile
 from sim.twin import Twin
 
 SETTING = Measurement(duration=24.0)

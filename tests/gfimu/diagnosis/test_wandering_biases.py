@@ -4,13 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from gfimu.diagnosis import diagnose
-from gfimu.diagnosis.data.stretch import make_stretches
-from gfimu.diagnosis.diagnose import prepare
-from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.search.nuisance_models import understand
-from sim.trials.study.cases import Case
-from sim.trials.study.outcome import draw_world
+from gfimu.diagnosis import Policy, diagnose, make_stretches, prepare, understand
+from sim.trials import Case, draw_world
 
 
 @pytest.mark.study

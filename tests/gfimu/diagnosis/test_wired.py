@@ -9,10 +9,7 @@ import pytest
 from core_cases import cause_of, dense, small_twin, stretches_of
 from numpy.testing import assert_allclose, assert_array_equal
 
-from gfimu.diagnosis.fit.learn import starting_point
-from gfimu.diagnosis.terms.library import cause_columns, family_columns
-from gfimu.diagnosis.terms.observed import observe
-from gfimu.diagnosis.terms.reach import behind_wiring
+from gfimu.diagnosis import behind_wiring, cause_columns, family_columns, observe, starting_point
 from sim.effects import EFFECTS, make_effect
 
 TWIN = small_twin("cube12", rate=100.0)

@@ -6,8 +6,8 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from gfimu import EarthRotation, InputError
-from gfimu.array.gravity import EARTH_RATE
-from gfimu.motion.attitude import from_rotation, to_rotation
+from gfimu.array import EARTH_RATE
+from gfimu.motion import from_rotation, to_rotation
 
 EARTH = EarthRotation(35.0, 0.7)
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gfimu import AccelerometerArray, Estimate, Recording, specific_force, summarise
-from gfimu.array.parts.limits import PartLimits
+from gfimu.array import PartLimits
 from gfimu.motion.estimation import estimate
 from gfimu.visual.run_plots import free_rate_plots
 

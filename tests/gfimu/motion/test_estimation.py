@@ -20,10 +20,9 @@ from gfimu import (
     specific_force,
     summarise,
 )
-from gfimu.array.kinematics import omega_products
-from gfimu.array.parts.part import white_noise_std
-from gfimu.base.units import STANDARD_GRAVITY
-from gfimu.motion.attitude import to_rotation
+from gfimu.array import omega_products, white_noise_std
+from gfimu.base import STANDARD_GRAVITY
+from gfimu.motion import to_rotation
 
 CUBE = AccelerometerArray.load("cube12")
 

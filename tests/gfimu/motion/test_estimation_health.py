@@ -7,7 +7,7 @@ import pytest
 
 import gfimu
 from gfimu import AccelerometerArray, Estimate, InputError
-from gfimu.rate.health.fault import HealthCode
+from gfimu.rate import HealthCode
 
 
 @pytest.fixture(scope="module")

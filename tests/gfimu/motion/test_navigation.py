@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from gfimu import InputError, integrate_attitude, level, navigate
-from gfimu.motion.attitude import from_rotation, to_rotation
+from gfimu.motion import from_rotation, to_rotation
 
 G = 9.80665
 

@@ -7,8 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from gfimu import InputError, navigate
-from gfimu.motion.attitude import from_rotation, to_rotation
-from gfimu.motion.rest_navigation import navigate_with_rest
+from gfimu.motion import from_rotation, navigate_with_rest, to_rotation
 
 G = 9.80665
 T = np.arange(0, 20, 0.01)

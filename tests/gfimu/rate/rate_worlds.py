@@ -9,9 +9,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from gfimu import AccelerometerArray, Chip, SensorErrors, posterior_rate_bound
-from gfimu.rate.filter import filter_rate
-from gfimu.rate.rest_test import RestTest
-from gfimu.rate.smoother import smooth_rate
+from gfimu.rate import RestTest, filter_rate, smooth_rate
 
 GRAVITY = 9.80665
 LSB = 0.0039 * GRAVITY

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import least_squares
 
-from gfimu.rate.sensing import ChannelTables
+from gfimu.rate import ChannelTables
 
 
 def centred_weights(points=6):

@@ -8,10 +8,10 @@ from rate_worlds import cube, measure, sensor_errors, tumble
 from scipy.stats import chi2
 
 from gfimu import AccelerometerArray, Recording, estimate_from_rest, specific_force, summarise
-from gfimu.array.parts.limits import PartLimits
-from gfimu.base.units import STANDARD_GRAVITY
+from gfimu.array import PartLimits
+from gfimu.base import STANDARD_GRAVITY
+from gfimu.rate import filter_rate
 from gfimu.rate.consistency import FALSE_ALARM, _slow_quantile, judge_consistency, slow_error_signatures
-from gfimu.rate.filter import filter_rate
 from sim.scenarios import Scenario
 from sim.simulation import simulate
 

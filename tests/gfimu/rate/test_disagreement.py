@@ -9,9 +9,8 @@ import pytest
 from rate_worlds import cube, measure, sensor_errors, tumble
 
 from gfimu import AccelerometerArray, estimate_rate
-from gfimu.rate.disagreement import MeasuredNoise, lasting_scale, measured_scale, sum_up_disagreement
-from gfimu.rate.filter import filter_rate
-from gfimu.rate.kalman import FilterSettings
+from gfimu.rate import FilterSettings, MeasuredNoise, filter_rate
+from gfimu.rate.disagreement import lasting_scale, measured_scale, sum_up_disagreement
 from gfimu.rate.refinement import parity_scale
 
 RATE = 100.0

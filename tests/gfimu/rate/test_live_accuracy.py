@@ -10,8 +10,7 @@ import pytest
 from rate_worlds import measure, sensor_errors, tumble
 
 from gfimu import AccelerometerArray, LiveRateFilter
-from gfimu.rate.kalman import FilterSettings
-from gfimu.rate.stream import filter_stream
+from gfimu.rate import FilterSettings, filter_stream
 
 RATE = 100.0
 

@@ -16,8 +16,7 @@ from rate_worlds import cube, first_rest, measure, rms, sensor_errors, study, tu
 from scipy.stats import chi2
 
 from gfimu import posterior_rate_bound
-from gfimu.rate.filter import filter_rate
-from gfimu.rate.kalman import FilterSettings
+from gfimu.rate import FilterSettings, filter_rate
 
 SCENARIOS = [(turntable, speed) for speed in (0.1, 1, 10)] + [(tumble, speed) for speed in (0.1, 1, 8)]
 NAMES = [f"{motion.__name__}-{speed}" for motion, speed in SCENARIOS]

@@ -5,8 +5,8 @@ import pytest
 import scipy.integrate
 
 from gfimu import InputError
-from gfimu.array.kinematics import omega_products
-from gfimu.rate.feedback import integrate_rate_recursively
+from gfimu.array import omega_products
+from gfimu.rate import integrate_rate_recursively
 
 # α_x = u_x + ω_y ω_z and so on: the six uniaxial sensors at the face centres.
 LEAKAGE = -np.array([[0, 0, 0, 0, 0, 1.0], [0, 0, 0, 0, 1.0, 0], [0, 0, 0, 1.0, 0, 0]])

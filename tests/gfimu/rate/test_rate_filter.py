@@ -11,15 +11,11 @@ from reference_filter import reference_filter, reference_smoother
 
 from gfimu import AccelerometerArray, GeometryError, InputError, LiveRateFilter, SensorErrors, estimate_rate
 from gfimu.array.quadrature import even_weights
+from gfimu.rate import ChannelTables, FilterSettings, MeasuredNoise, filter_rate, smooth_rate
 from gfimu.rate.backward import backward
-from gfimu.rate.disagreement import MeasuredNoise
-from gfimu.rate.filter import filter_rate
-from gfimu.rate.kalman import FilterSettings
 from gfimu.rate.methods import RATE_METHODS
 from gfimu.rate.preparation import prepare
 from gfimu.rate.recursion import forward
-from gfimu.rate.sensing import ChannelTables
-from gfimu.rate.smoother import smooth_rate
 
 CUBE = cube()
 RATE = 100.0

@@ -13,14 +13,11 @@ from rate_worlds import Motion, cube, measure, sensor_errors, tumble
 
 import gfimu
 from gfimu import AccelerometerArray, LiveRateFilter, Recording, SensorErrors, estimate_rate, summarise
-from gfimu.array.kinematics import omega_products
-from gfimu.array.parts.part import white_noise_std
-from gfimu.rate.filter import filter_rate
+from gfimu.array import omega_products, white_noise_std
+from gfimu.rate import ChannelTables, FilterSettings, filter_rate, smooth_rate
 from gfimu.rate.guard import Guard
-from gfimu.rate.kalman import FilterSettings, KalmanRateFilter, join
+from gfimu.rate.kalman import KalmanRateFilter, join
 from gfimu.rate.rest_test import shown_variance
-from gfimu.rate.sensing import ChannelTables
-from gfimu.rate.smoother import smooth_rate
 from gfimu.rate.start import CONTRADICTION, contradicts_biases, contradicts_rest
 
 METHODS = ("filter", "smoother", "live")

@@ -6,10 +6,7 @@ import numpy as np
 import pytest
 from rate_worlds import cube, measure, readings, rms, sensor_errors, tumble, turntable
 
-from gfimu.rate.disagreement import MeasuredNoise
-from gfimu.rate.filter import filter_rate
-from gfimu.rate.kalman import FilterSettings
-from gfimu.rate.smoother import smooth_rate
+from gfimu.rate import FilterSettings, MeasuredNoise, filter_rate, smooth_rate
 
 RATE = 100.0
 RUNS = 6

@@ -9,11 +9,7 @@ import pytest
 from rate_worlds import GRAVITY, Motion, cube, measure, sensor_errors, smooth_step, total_noise_std, turntable
 
 from gfimu import InputError, LiveRateFilter
-from gfimu.rate.filter import filter_rate
-from gfimu.rate.kalman import FilterSettings
-from gfimu.rate.rest_test import RestTest, constant_readings
-from gfimu.rate.sensing import ChannelTables
-from gfimu.rate.smoother import smooth_rate
+from gfimu.rate import ChannelTables, FilterSettings, RestTest, constant_readings, filter_rate, smooth_rate
 
 ARRAY = cube(0.1)
 RATE = 100.0

@@ -8,9 +8,7 @@ import numpy as np
 import pytest
 from rate_worlds import GRAVITY, TURN_ON_BIAS, Motion, cube, measure, sensor_errors, smooth_step, tumble
 
-from gfimu.rate.filter import filter_rate
-from gfimu.rate.kalman import FilterSettings
-from gfimu.rate.smoother import smooth_rate
+from gfimu.rate import FilterSettings, filter_rate, smooth_rate
 
 RATE = 100.0
 DARK = FilterSettings(start_omega=None)

@@ -9,7 +9,7 @@ import pytest
 from rate_worlds import GRAVITY, TURN_ON_BIAS, Motion, cube, measure, sensor_errors, tumble, turntable
 
 from gfimu import estimate_rate
-from gfimu.rate.kalman import FilterSettings
+from gfimu.rate import FilterSettings
 from gfimu.rate.sign_chain import SignChain, SignSteps, sign_probabilities
 
 RATE = 100.0

@@ -8,12 +8,10 @@ import numpy as np
 import pytest
 
 from gfimu import AccelerometerArray, InputError, Recording, SensorErrors
-from gfimu.array.parts.limits import PartLimits
-from gfimu.array.parts.part import Part, white_noise_std
-from gfimu.calibration.run_file import open_uncalibrated
-from gfimu.recording.carried_array import array_difference
-from gfimu.recording.formats import open_run
-from sim.chips.data_sheet import DataSheet
+from gfimu.array import Part, PartLimits, white_noise_std
+from gfimu.calibration import open_uncalibrated
+from gfimu.recording import array_difference, open_run
+from sim import DataSheet
 
 CUBE = AccelerometerArray.load("cube12")
 FORMATS = ("csv", "parquet")

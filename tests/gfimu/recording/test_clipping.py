@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import gfimu
-from gfimu.recording.clipping import without_clipped
+from gfimu.recording import without_clipped
 
 
 @pytest.fixture(scope="module")

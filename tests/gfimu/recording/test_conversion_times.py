@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gfimu.recording import Recording
-from gfimu.recording.timing.conversion_times import conversion_times
+from gfimu.recording import Recording, conversion_times
 
 BITS = [4, 5, 6, 7]
 CHANNELS = tuple(f"a{chip}{axis}" for chip in range(1, 5) for axis in range(1, 4))

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from gfimu import AccelerometerArray, CorruptValueWarning, InputError, Recording, estimate
-from gfimu.array.parts.plausible import largest_of_array, largest_of_part
-from gfimu.recording.formats import open_run
+from gfimu.array import largest_of_array, largest_of_part
+from gfimu.recording import open_run
 
 CUBE = AccelerometerArray.load("cube12")
 RAIL = 156.9064  # 16 g

@@ -7,9 +7,7 @@ import pytest
 
 import gfimu
 from gfimu import AccelerometerArray, InputError, MappedFile, Recording, RecordingWarning
-from gfimu.recording.formats import open_run
-from gfimu.recording.importing.clock import increasing_times
-from gfimu.recording.mapped import mapped_recording
+from gfimu.recording import increasing_times, mapped_recording, open_run
 
 CUBE = AccelerometerArray.load("cube12")
 N = 500
@@ -118,7 +116,7 @@ def test_raw_counts_stay_counts(clean, tmp_path):
     path = tmp_path / "raw.csv"
     path.write_text((tmp_path / "run.csv").read_text().replace("_m_s2", "_lsb"))
     from gfimu import load_map
-    from gfimu.calibration.run_file import open_uncalibrated
+    from gfimu.calibration import open_uncalibrated
 
     raw = open_uncalibrated(MappedFile(path, load_map(None, ["time.start_s=1"])))
     assert raw.unit == "lsb"

@@ -7,9 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from gfimu import AccelerometerArray, Chip
-from gfimu.base.units import STANDARD_GRAVITY
-from gfimu.recording import Recording
-from gfimu.recording.checks import check_recording
+from gfimu.base import STANDARD_GRAVITY
+from gfimu.recording import Recording, check_recording
 
 ONE = AccelerometerArray("one", (Chip("a1", np.array([0.15, 0.0, 0.0]), np.eye(3), "generic"),))
 

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gfimu import AccelerometerArray, InputError, open_recording, read_mimu4444
-from gfimu.base.units import STANDARD_GRAVITY
-from gfimu.recording.mimu4444 import is_mimu4444
+from gfimu.base import STANDARD_GRAVITY
+from gfimu.recording import is_mimu4444
 
 ACKNOWLEDGE = bytes.fromhex("A02800C8")
 PERIOD = 1_024_000  # ticks of 64 MHz: 16 ms

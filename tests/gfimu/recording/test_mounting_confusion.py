@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from gfimu import AccelerometerArray
-from gfimu.base.units import STANDARD_GRAVITY
-from gfimu.recording.checks import check_recording
+from gfimu.base import STANDARD_GRAVITY
+from gfimu.recording import check_recording
 from sim.scenarios import Scenario
 from sim.simulation import simulate
 

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from gfimu import AccelerometerArray, InputError, Recording, UnitError
-from gfimu.base.units import STANDARD_GRAVITY
+from gfimu.base import STANDARD_GRAVITY
 
 CUBE = AccelerometerArray.load("cube12")
 FORMATS = ("csv", "parquet")

@@ -9,11 +9,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from gfimu import AccelerometerArray, InputError, Recording, estimate, estimate_from_rest, specific_force
-from gfimu.array.parts.limits import PartLimits
-from gfimu.base.files.model_files import list_models
-from gfimu.base.units import STANDARD_GRAVITY
-from gfimu.recording.checks import check_recording, refuse_or_warn
-from gfimu.recording.formats import open_run
+from gfimu.array import PartLimits
+from gfimu.base import STANDARD_GRAVITY, list_models
+from gfimu.recording import check_recording, open_run
+from gfimu.recording.checks import refuse_or_warn
 from sim.scenarios import Scenario
 from sim.simulation import simulate
 from sim.trials.benchmark.generators.independent_world import hide

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from gfimu import AccelerometerArray, InputError, Recording, estimate, simulate
-from gfimu.array.parts.limits import PartLimits
-from gfimu.recording.checks import check_recording
-from gfimu.recording.evidence.reference_rate import odd_rates
+from gfimu.array import PartLimits
+from gfimu.recording import check_recording, odd_rates
 
 CUBE = AccelerometerArray.load("cube12")
 RPM, DEG = 30.0 / np.pi, 180.0 / np.pi

@@ -8,13 +8,10 @@ import numpy as np
 import pytest
 
 from gfimu import AccelerometerArray
-from gfimu.diagnosis.data.run import prepare_run
-from gfimu.diagnosis.data.stretch import make_stretches, moved
-from gfimu.diagnosis.fit.learn import starting_point
-from gfimu.diagnosis.policy import Policy
-from gfimu.recording import Recording
+from gfimu.diagnosis import Policy, make_stretches, prepare_run, starting_point
+from gfimu.diagnosis.data.stretch import moved
+from gfimu.recording import Recording, reference_on_rows, reference_series
 from gfimu.recording.joining import ReferenceSeries, join_reference
-from gfimu.recording.timing.reference_times import reference_on_rows, reference_series
 from sim.twin import Twin
 
 TWIN = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from gfimu import InputError
-from gfimu.recording import Recording
-from gfimu.recording.rest import detect_rest, motion_statistic
+from gfimu.recording import Recording, detect_rest, motion_statistic
 
 RATE = 100.0
 

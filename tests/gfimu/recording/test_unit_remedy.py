@@ -5,8 +5,8 @@ import pytest
 
 import gfimu
 from gfimu import InputError
-from gfimu.base.units import STANDARD_GRAVITY
-from gfimu.recording.checks import check_recording
+from gfimu.base import STANDARD_GRAVITY
+from gfimu.recording import check_recording
 
 
 @pytest.fixture(scope="module")

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from gfimu import InputError
-from gfimu.sensor_noise.innovations import add_noise, flicker_shape
-from sim.trials.worlds.hidden import bias_instability
+from gfimu.sensor_noise import add_noise, flicker_shape
+from sim.trials import bias_instability
 
 N = 2000
 WHITE, FLICKER = np.array([0.03, 0.2, 1.0]), np.array([0.1, 0.2, 0.01])

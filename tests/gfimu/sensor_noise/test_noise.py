@@ -15,12 +15,12 @@ from gfimu.sensor_noise import (
     flicker_noise,
     identify_noise,
     kalibr_yaml,
+    model_variance,
     random_walk,
     recording_noise,
     synthesise_noise,
     white_noise,
 )
-from gfimu.sensor_noise.identification import model_variance
 
 RATE = 100.0
 

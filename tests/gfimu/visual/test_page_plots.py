@@ -10,7 +10,8 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from gfimu.base.results.colours import PAGE, TONES, chip_colour
+from gfimu.base import PAGE, chip_colour
+from gfimu.base.results.colours import TONES
 from gfimu.visual.page import Packed, enveloped, page_plots
 
 

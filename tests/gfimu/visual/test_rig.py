@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from gfimu import AccelerometerArray, Chip, TurningAxis
-from gfimu.base.results.colours import chip_colour
+from gfimu.base import chip_colour
 from gfimu.visual import Box, Cylinder, Names, Pointers
 from gfimu.visual.rig import (
     array_shapes,

@@ -16,8 +16,8 @@ from scipy.spatial.transform import Rotation
 
 import gfimu
 from gfimu import AccelerometerArray, Chip, InputError, Recording, TurningAxis, specific_force
-from gfimu.rate.health.fault import HealthCode
-from gfimu.recording.formats import open_run
+from gfimu.rate import HealthCode
+from gfimu.recording import open_run
 from gfimu.visual import Box, Cylinder, ExpectedDrift, KnownMotion, Line, Mesh, Plot, write_comparison, write_run
 from gfimu.visual.picture import picture_of, picture_path
 from gfimu.visual.plots import _emptiest_corner, broken_at_gaps

@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gfimu import AccelerometerArray, InputError
-from sim.chips.adxl345 import Sensor, SensorErrors, SensorSettings, conversion_offsets, draw_errors, flicker, quantise
-from sim.chips.data_sheet import DataSheet
+from sim import DataSheet, quantise
+from sim.chips.adxl345 import Sensor, SensorErrors, SensorSettings, conversion_offsets, draw_errors, flicker
 
 MG = 9.80665e-3
 LSB = 3.9 * MG

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gfimu import AccelerometerArray, InputError
-from gfimu.array.parts.part import white_noise_std
+from gfimu.array import white_noise_std
 from sim.chips.adxl345 import Sensor, SensorSettings
 from sim.chips.conversions import conversion_groups
 from sim.ride import Ride

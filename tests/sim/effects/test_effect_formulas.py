@@ -10,14 +10,12 @@ from scipy.spatial.transform import Rotation
 
 from gfimu import AccelerometerArray
 from gfimu.model.generic_basis import Motion, basis_function
-from gfimu.motion.body_drive import BodyDrive
-from sim import forward
+from gfimu.motion import BodyDrive
+from sim import SpinState, forward
 from sim.body import body_channels
-from sim.effects import BODY_EFFECTS, CARRIAGE_EFFECTS, INCLINED_EFFECTS, SIMULATED_EFFECTS, TABLE_EFFECTS
-from sim.effects.description import describe
+from sim.effects import BODY_EFFECTS, CARRIAGE_EFFECTS, INCLINED_EFFECTS, SIMULATED_EFFECTS, TABLE_EFFECTS, describe
 from sim.effects.mounting import RailTilt
 from sim.effects.unknown import Unknown
-from sim.motions.motion import SpinState
 from sim.scenarios import Scenario
 from sim.simulation import simulate
 from sim.twin import Twin

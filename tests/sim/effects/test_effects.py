@@ -15,17 +15,15 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import lsim, lti
 
 from gfimu import AccelerometerArray, InputError
-from sim import forward
+from sim import SpinState, SplineSpin, forward, prescribed_readings
 from sim.effects import EFFECTS, Effect, apply_effects, make_effect
 from sim.effects.low_pass import low_pass, mass_on_spring
-from sim.motions.motion import SpinState, SplineSpin
 from sim.motions.profiles import Chirp, Hold, Ramp, spin_profile
 from sim.rigs.rig_model import turntable_model
-from sim.rigs.turntable import prescribed_readings
+from sim.trials import random_profile
 from sim.trials.benchmark.generators.independent_effects import DRAWS, SIZELESS, rig_with
 from sim.trials.benchmark.generators.independent_table import Rig, TableRun, drive_table
 from sim.trials.benchmark.generators.independent_world import Setting, noise_free
-from sim.trials.worlds.hidden import random_profile
 from sim.twin import Twin
 from sim.world import SampleContext, World
 

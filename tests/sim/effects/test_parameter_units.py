@@ -9,8 +9,7 @@ from every_item import every
 from gfimu import AccelerometerArray, NamedCause
 from gfimu.base.units import KEY_ENDINGS, NAME, NUMBER, RATIO, key_name
 from gfimu.diagnosis.report.plain_words import parameter_texts
-from sim.effects import BODY_EFFECTS, EFFECTS
-from sim.effects.base import Size
+from sim.effects import BODY_EFFECTS, EFFECTS, Size
 from sim.effects.unknown import Unknown
 
 CUBE = AccelerometerArray.load("cube12")

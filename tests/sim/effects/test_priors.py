@@ -6,8 +6,7 @@ import numpy as np
 from every_item import every
 
 from gfimu import AccelerometerArray
-from sim.effects import BODY_EFFECTS, CARRIAGE_EFFECTS, EFFECTS, INCLINED_EFFECTS, TABLE_EFFECTS
-from sim.effects.description import describe
+from sim.effects import BODY_EFFECTS, CARRIAGE_EFFECTS, EFFECTS, INCLINED_EFFECTS, TABLE_EFFECTS, describe
 
 MG = 9.80665e-3  # m/s²
 DEG = math.pi / 180.0

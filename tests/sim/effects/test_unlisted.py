@@ -5,15 +5,13 @@ import pytest
 from scipy.signal import lsim, lti
 
 from gfimu import AccelerometerArray, InputError
-from gfimu.base.files.model_files import find_model
-from sim import forward
+from gfimu.base import find_model
+from sim import SpinState, forward, prescribed_readings
 from sim.effects import EFFECTS, FURTHER_EFFECTS, make_effect
 from sim.effects.rig import shake_orders, sway_shapes
 from sim.effects.unlisted import UNLISTED
-from sim.motions.motion import SpinState
-from sim.rigs.turntable import prescribed_readings
 from sim.scenarios import Scenario
-from sim.trials.worlds.hidden import random_profile
+from sim.trials import random_profile
 from sim.twin import Twin
 
 ARRAY = AccelerometerArray.load("cube12")

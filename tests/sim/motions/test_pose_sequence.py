@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from gfimu import InputError
-from sim.motions.pose_sequence import POSE_SETS, PoseSequence
+from sim import POSE_SETS, PoseSequence
 from sim.scenarios import Scenario
 from sim.simulation import simulate
 

@@ -8,9 +8,8 @@ import pytest
 from scipy.integrate import quad
 
 from gfimu import AccelerometerArray, InputError
-from gfimu.base.files.model_files import find_model
-from sim import forward
-from sim.motions.motion import SpinState
+from gfimu.base import find_model
+from sim import SpinState, forward
 from sim.motions.profiles import Hold, Ramp, spin_profile
 from sim.rigs.dc_motor import DcMotor
 from sim.rigs.driven import Drive, drive

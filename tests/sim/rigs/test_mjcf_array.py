@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from gfimu import AccelerometerArray, InputError, RecordingWarning
-from gfimu.base.files.model_files import find_model
-from sim.rigs.mjcf_array import array_from_mjcf
+from gfimu.base import find_model
+from sim import array_from_mjcf
 
 TURNED = """<mujoco>
   <worldbody>

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from gfimu import AccelerometerArray, Chip, specific_force
 from gfimu.base.files.model_files import models_directory
-from sim.rigs.mjcf_array import array_from_mjcf
+from sim import array_from_mjcf
 from sim.rigs.mjcf_export import RIGS, array_as_mjcf
 
 ROUNDING = 1e-11  # m/s², of readings of some 10 m/s² through MuJoCo's tree

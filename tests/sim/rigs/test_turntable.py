@@ -7,14 +7,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from gfimu import AccelerometerArray, Chip, InputError, specific_force
-from gfimu.base.units import STANDARD_GRAVITY
-from sim import forward
+from gfimu.base import STANDARD_GRAVITY
+from sim import SpinState, forward, prescribed_readings
 from sim.effects import make_effect
-from sim.motions.motion import SpinState
 from sim.motions.profiles import Chirp, Hold, Ramp, Tumble, spin_profile
 from sim.rigs.driven import drive
 from sim.rigs.rig_model import free_model, turntable_model
-from sim.rigs.turntable import prescribed_readings
 from sim.truth import cube_state
 from sim.world import Nod, World
 

@@ -8,7 +8,7 @@ import pytest
 from every_item import every
 
 from gfimu import InputError
-from gfimu.base.files.model_files import find_model, list_models, read_toml
+from gfimu.base import find_model, list_models, read_toml
 from gfimu.base.files.schema_keys import json_schema, table_rows
 from gfimu.commands.file_kinds import FILE_KINDS, check_file, file_schema
 

@@ -20,8 +20,8 @@ from gfimu import (
     estimate_rate,
     open_recording,
 )
-from gfimu.base.units import STANDARD_GRAVITY
-from gfimu.recording.formats import open_run
+from gfimu.base import STANDARD_GRAVITY
+from gfimu.recording import open_run
 
 CUBE = AccelerometerArray.load("cube12")
 

@@ -12,9 +12,9 @@ from gfimu import AccelerometerArray
 from gfimu.budget.tolerances.budget import tolerance_budget
 from gfimu.budget.tolerances.calibrated import remaining
 from gfimu.budget.tolerances.propagation import error_maps, null_space_of
+from gfimu.calibration import Observations
 from gfimu.calibration.array_static import array_static
 from gfimu.calibration.nonlinearity import quadratic_std
-from gfimu.calibration.observations import Observations
 from gfimu.rate.maximum_likelihood import rates_of_null_space
 from gfimu.recording import Recording
 from sim.trials.worlds.toleranced import draw_unit, known_motion_of, reference_motion

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from gfimu import Calibration
-from gfimu.calibration.error_model import ErrorModel
+from gfimu.calibration import ErrorModel
 from gfimu.calibration.parameter_names import parameter_names, quadratic_names
 
 PARAMETERS = 15

@@ -14,8 +14,8 @@ from gfimu.calibration.parameter_names import parameter_names
 from gfimu.recording import Recording
 from gfimu.recording.carried_array import array_metadata
 from gfimu.sensor_noise import flicker_noise
+from sim import SpinState
 from sim.forward import rigid_readings
-from sim.motions.motion import SpinState
 from sim.world import World
 
 CUBE = AccelerometerArray.load("cube12")

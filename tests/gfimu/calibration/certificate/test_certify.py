@@ -9,8 +9,8 @@ import pytest
 from certification_cases import calibration_of, random_covariance, random_model, random_rotation
 
 from gfimu import Certificate, InputError
+from gfimu.calibration import certify
 from gfimu.calibration.certificate.certificate import Component, Sheet, Term
-from gfimu.calibration.certificate.certify import certify
 from gfimu.calibration.certificate.quantities import stated_quantities
 from gfimu.calibration.certificate.schema import SCHEMA_FILE, certificate_schema
 from gfimu.calibration.combine import combine

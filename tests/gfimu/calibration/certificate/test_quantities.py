@@ -8,11 +8,10 @@ from certification_cases import calibration_of, random_covariance, random_model,
 from scipy.linalg import block_diag
 from scipy.spatial.transform import Rotation
 
+from gfimu.calibration import ErrorModel, Observations
 from gfimu.calibration.certificate.chip_parameters import chip_parameters
 from gfimu.calibration.certificate.quantities import intrinsic_quantities, stated_quantities
-from gfimu.calibration.error_model import ErrorModel
 from gfimu.calibration.multi_position import multi_position
-from gfimu.calibration.observations import Observations
 
 GAUGES = ("poses", "x_axis", "z_axis", "coarse", "array")
 

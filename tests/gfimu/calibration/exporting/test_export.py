@@ -7,9 +7,7 @@ import pytest
 
 import gfimu
 from gfimu import AccelerometerArray, InputError, load_map
-from gfimu.recording import Recording
-from gfimu.recording.importing import inspect_file
-from gfimu.recording.mapped import mapped_recording
+from gfimu.recording import Recording, inspect_file, mapped_recording
 
 ARRAY = AccelerometerArray.load("cube12_as_built")
 T = np.arange(0.0, 3.0, 0.01)

@@ -9,15 +9,12 @@ from functools import cache
 import numpy as np
 
 from gfimu import AccelerometerArray
-from gfimu.diagnosis.data.stretch import Stretch, make_stretches
-from gfimu.diagnosis.diagnose import prepare
+from gfimu.diagnosis import Cause, Policy, learn_noise, learn_roughness, make_stretches, prepare, starting_point
+from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.gauss_newton import Fit, fit
-from gfimu.diagnosis.fit.learn import learn_noise, learn_roughness, starting_point
-from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.terms.cause import Cause
 from gfimu.recording import Recording
 from sim.effects import Effect
-from sim.trials.worlds.hidden import Measurement, measure, random_profile
+from sim.trials import Measurement, measure, random_profile
 from sim.twin import Twin
 
 Change = Callable[..., None]

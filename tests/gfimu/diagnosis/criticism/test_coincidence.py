@@ -7,11 +7,11 @@ import pytest
 from numpy.testing import assert_allclose
 
 from gfimu import AccelerometerArray
+from gfimu.diagnosis import Cause
 from gfimu.diagnosis.criticism.coincidence.bound_numbers import coincidences
 from gfimu.diagnosis.criticism.coincidence.patterns import Pattern, channel_patterns, chip_patterns, distinct
 from gfimu.diagnosis.fit.gauss_newton import Fit
 from gfimu.diagnosis.fit.linear import Point
-from gfimu.diagnosis.terms.cause import Cause
 from sim.effects import EFFECTS
 
 ARRAY, UPRIGHT = AccelerometerArray.load("cube12"), np.eye(3)

@@ -9,8 +9,8 @@ import pytest
 from made_runs import PERIOD, SIGMA, made_view
 from numpy.testing import assert_allclose
 
+from gfimu.diagnosis import RunView
 from gfimu.diagnosis.criticism.views.dependence import dependences, fingerprint, listed, quantities
-from gfimu.diagnosis.criticism.views.run_view import RunView
 from gfimu.diagnosis.criticism.views.whiteness import whitening_gain
 
 N = 4000

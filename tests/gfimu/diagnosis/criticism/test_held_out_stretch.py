@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gfimu.diagnosis import Policy
 from gfimu.diagnosis.criticism.held_out_stretch import Measured, gain_of
-from gfimu.diagnosis.policy import Policy
 
 POLICY = Policy()
 ONE = Measured(

@@ -7,9 +7,9 @@ from dataclasses import replace
 import pytest
 from made_fits import POLICY, cause, channel, fitted, quiet, recorded, twin
 
-from gfimu.base.units import STANDARD_GRAVITY
-from gfimu.diagnosis.criticism.reading_curve import reading_curve
-from gfimu.model.generic_basis import OF_READING
+from gfimu.base import STANDARD_GRAVITY
+from gfimu.diagnosis import reading_curve
+from gfimu.model import OF_READING
 from sim.effects import make_effect
 
 CHANNEL = "a12"

@@ -175,7 +175,7 @@ def test_whiteness_tests_are_calibrated_and_see_colour():
 def test_whitening_makes_coloured_noise_white():
     from scipy.fft import dct
 
-    from sim.trials.worlds.hidden import bias_instability
+    from sim.trials import bias_instability
 
     rng = np.random.default_rng(7)
     white = np.array([0.03, 0.02])

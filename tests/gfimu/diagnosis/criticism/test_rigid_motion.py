@@ -7,11 +7,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from gfimu import AccelerometerArray
-from gfimu.diagnosis.criticism.views.rigid_motion import motion_columns, rigid_motion
-from gfimu.diagnosis.data.stretch import make_stretches
-from gfimu.diagnosis.diagnose import prepare
+from gfimu.diagnosis import make_stretches, motion_columns, prepare, rigid_motion
 from sim.effects import make_effect
-from sim.trials.worlds.hidden import Measurement, measure
+from sim.trials import Measurement, measure
 from sim.twin import Twin
 
 SETTING = Measurement(duration=30.0)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from made_fits import cause, fitted, recorded, twin
 
-from gfimu.diagnosis.criticism.views.run_views import run_views
-from gfimu.diagnosis.diagnose import prepare
+from gfimu.diagnosis import prepare, run_views
 from sim.effects import make_effect
 
 

@@ -9,7 +9,7 @@ import pytest
 from made_bodies import TWIN, hand_motion, hand_recording, hand_stretch
 
 from gfimu import InputError
-from gfimu.diagnosis.data.body.prepared import prepare_bodies, robust_prediction
+from gfimu.diagnosis import prepare_bodies, robust_prediction
 
 MOTION = hand_motion()
 WHITE = TWIN.expected_noise(100.0).white

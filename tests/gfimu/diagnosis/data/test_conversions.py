@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from gfimu.diagnosis import Run, predicted_by_reference, prepare_run
 from gfimu.diagnosis.data.conversions import Conversions
-from gfimu.diagnosis.data.run import Run, prepare_run, smooth_rate
+from gfimu.diagnosis.data.run import smooth_rate
 from gfimu.diagnosis.data.table.settling import settled
-from gfimu.diagnosis.fit.learn import predicted_by_reference
 from gfimu.recording import Recording
-from sim.motions.motion import SpinState
+from sim import SpinState
 from sim.twin import Twin
 
 TWIN = Twin.load("cube12_turntable")

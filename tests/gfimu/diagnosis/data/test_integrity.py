@@ -9,13 +9,10 @@ import pytest
 from scipy.ndimage import gaussian_filter1d
 
 from gfimu import AccelerometerArray
-from gfimu.diagnosis import diagnose
-from gfimu.diagnosis.data.integrity import check_integrity
-from gfimu.diagnosis.data.run import prepare_run
-from gfimu.diagnosis.data.samples import frozen_stretches
+from gfimu.diagnosis import check_integrity, diagnose, frozen_stretches, prepare_run
+from sim import SplineSpin
 from sim.effects import make_effect
-from sim.motions.motion import SplineSpin
-from sim.trials.worlds.hidden import Measurement, measure
+from sim.trials import Measurement, measure
 from sim.twin import Twin
 
 FASTEST = 20.0  # rad/s: the highest readings are centripetal

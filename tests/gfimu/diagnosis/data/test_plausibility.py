@@ -8,12 +8,10 @@ import numpy as np
 import pytest
 
 from gfimu import AccelerometerArray, InputError
-from gfimu.base.units import STANDARD_GRAVITY
-from gfimu.diagnosis import diagnose
-from gfimu.diagnosis.data.run import prepare_run
-from gfimu.diagnosis.diagnose import prepare
+from gfimu.base import STANDARD_GRAVITY
+from gfimu.diagnosis import diagnose, prepare, prepare_run
 from sim.effects import EFFECTS
-from sim.trials.worlds.hidden import Measurement, hidden_effect, measure, random_profile
+from sim.trials import Measurement, hidden_effect, measure, random_profile
 from sim.twin import Twin
 
 TWIN = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from core_cases import lively, small_twin
 
-from gfimu.diagnosis.data.prepared_runs import PreparedRuns
+from gfimu.diagnosis import PreparedRuns
 from sim.effects import make_effect
-from sim.trials.worlds.hidden import Measurement, measure
+from sim.trials import Measurement, measure
 
 TWIN = small_twin("cube12")
 

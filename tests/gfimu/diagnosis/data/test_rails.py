@@ -10,13 +10,11 @@ import pytest
 from scipy.ndimage import gaussian_filter1d
 
 from gfimu import AccelerometerArray, Chip
-from gfimu.diagnosis import diagnose
-from gfimu.diagnosis.data.integrity import check_integrity
-from gfimu.diagnosis.data.run import prepare_run
-from gfimu.recording.importing.oddities import rails_of
+from gfimu.diagnosis import check_integrity, diagnose, prepare_run
+from gfimu.recording import rails_of
+from sim import SplineSpin
 from sim.effects import make_effect
-from sim.motions.motion import SplineSpin
-from sim.trials.worlds.hidden import Measurement, measure
+from sim.trials import Measurement, measure
 from sim.twin import Twin
 
 STEP = 3.9e-3 * 9.80665  # m/s²

@@ -9,7 +9,7 @@ import pytest
 from core_cases import lively, small_twin, stretches_of
 
 from gfimu import InputError
-from gfimu.diagnosis.data.plausibility import refuse_implausible
+from gfimu.diagnosis import refuse_implausible
 
 TWIN = small_twin("cube12")
 
@@ -76,7 +76,7 @@ def test_a_reference_without_a_direction_is_told_turn_by_turn(predict, stretch):
     def of(run):
         rate = run.reference
         period = run.sample_period
-        from gfimu.diagnosis.data.table.spins import State
+        from gfimu.diagnosis import State
 
         class Tabled:
             def at(self, times):

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from gfimu import InputError
+from gfimu.diagnosis import time_grid
 from gfimu.diagnosis.data.reference import (
     BRIDGED_GAP,
     REFERENCE_COLUMNS,
@@ -16,7 +17,6 @@ from gfimu.diagnosis.data.reference import (
     reference_on_grid,
     unreferenced,
 )
-from gfimu.diagnosis.data.time_grid import time_grid
 from gfimu.recording import Recording
 from sim.twin import Twin
 

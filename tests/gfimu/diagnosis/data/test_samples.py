@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from made_runs import PERIOD, made_run, without
 
-from gfimu.diagnosis.data.samples import channel_spikes, frozen_fault, frozen_stretches, is_at_extreme, reference_spikes
+from gfimu.diagnosis import frozen_stretches
+from gfimu.diagnosis.data.samples import channel_spikes, frozen_fault, is_at_extreme, reference_spikes
 
 N, SIGMA, STEP = 1000, 0.05, 0.04
 T = PERIOD * np.arange(N)

@@ -6,10 +6,7 @@ import numpy as np
 import pytest
 
 import gfimu
-from gfimu.diagnosis.data.run import prepare_run
-from gfimu.diagnosis.data.stretch import make_stretches
-from gfimu.diagnosis.data.table.spins import State
-from gfimu.diagnosis.data.table.start_angle import gravity_angle
+from gfimu.diagnosis import State, gravity_angle, make_stretches, prepare_run
 from sim.scenarios import Scenario
 from sim.twin import Twin
 

@@ -9,12 +9,9 @@ import pytest
 from core_cases import lively, small_twin, stretches_of
 from numpy.testing import assert_allclose
 
-from gfimu.diagnosis.data.run import prepare_run
-from gfimu.diagnosis.data.stretch import RunUp, make_stretches
-from gfimu.diagnosis.fit.learn import starting_point
-from gfimu.diagnosis.terms.drive import Drive
+from gfimu.diagnosis import Drive, RunUp, make_stretches, prepare_run, starting_point
 from sim.effects import make_effect
-from sim.trials.worlds.hidden import Measurement, measure
+from sim.trials import Measurement, measure
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ from gfimu import AccelerometerArray
 from gfimu.diagnosis import diagnose
 from gfimu.diagnosis.data.rounding import between_steps
 from sim.effects import make_effect
-from sim.trials.worlds.hidden import Measurement, measure
+from sim.trials import Measurement, measure
 from sim.twin import Twin
 
 STEP = 1 / 16

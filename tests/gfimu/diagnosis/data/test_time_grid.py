@@ -9,11 +9,9 @@ import numpy as np
 import pytest
 
 from gfimu import AccelerometerArray, RecordingWarning
-from gfimu.diagnosis import diagnose
-from gfimu.diagnosis.data.run import prepare_run
-from gfimu.diagnosis.data.time_grid import time_grid
+from gfimu.diagnosis import diagnose, prepare_run, time_grid
 from gfimu.recording import Recording
-from sim.trials.worlds.hidden import Measurement, measure
+from sim.trials import Measurement, measure
 from sim.twin import Twin
 
 PERIOD = 0.01

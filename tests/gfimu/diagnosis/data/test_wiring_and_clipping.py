@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from gfimu.diagnosis import prepare_run
 from gfimu.diagnosis.data.faults.clipping import clipping_level, own_rails
 from gfimu.diagnosis.data.faults.wiring import find_wiring, range_factors, rewired
-from gfimu.diagnosis.data.run import prepare_run
 from sim.effects import make_effect
-from sim.trials.worlds.hidden import Measurement, measure, random_profile
+from sim.trials import Measurement, measure, random_profile
 from sim.twin import Twin
 
 TWIN = Twin.load("cube12_turntable")

@@ -8,8 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gfimu import InputError
-from gfimu.diagnosis import diagnose
-from gfimu.diagnosis.data.run import prepare_run
+from gfimu.diagnosis import diagnose, prepare_run
 from gfimu.diagnosis.design.ambiguity import open_effects
 from gfimu.diagnosis.design.design import Limits, design
 from gfimu.diagnosis.design.distinguishability import (
@@ -24,7 +23,7 @@ from gfimu.diagnosis.design.profile_search import plain_profile, profile_of, sta
 from gfimu.diagnosis.design.proposal import SEPARATED
 from sim.effects import make_effect
 from sim.scenarios import Scenario
-from sim.trials.worlds.hidden import Measurement, measure, random_profile
+from sim.trials import Measurement, measure, random_profile
 from sim.twin import Twin
 
 LIMITS = Limits(rate=15.0, acceleration=20.0, duration=30.0)

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from scipy.optimize import nnls
 
 from gfimu import InputError
+from gfimu.diagnosis import Columns, family_columns
 from gfimu.diagnosis.design.distinguishability import (
     Contender,
     PlannedRun,
@@ -21,8 +22,6 @@ from gfimu.diagnosis.design.distinguishability import (
 from gfimu.diagnosis.design.planned_run import planned
 from gfimu.diagnosis.design.table_profile import Leg, TableProfile
 from gfimu.diagnosis.fit.linear import linearise
-from gfimu.diagnosis.terms.columns import Columns
-from gfimu.diagnosis.terms.library import family_columns
 from sim.effects import make_effect
 from sim.twin import Twin
 

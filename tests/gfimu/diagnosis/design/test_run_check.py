@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from gfimu import AccelerometerArray, InputError
-from gfimu.diagnosis.design.run_check import check_runs, turns_one_way
+from gfimu.diagnosis import check_runs, turns_one_way
 from gfimu.recording import Recording
-from sim.trials.worlds.hidden import Measurement, measure
+from sim.trials import Measurement, measure
 from sim.twin import Twin
 
 TWIN = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")

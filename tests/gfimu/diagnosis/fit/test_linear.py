@@ -9,8 +9,7 @@ import pytest
 from core_cases import cause_of, dense, dense_gaussian, lively, part_of, small_twin, stretches_of
 from numpy.testing import assert_allclose
 
-from gfimu.diagnosis.data.cosine_basis import NoiseLevels
-from gfimu.diagnosis.fit.learn import starting_point
+from gfimu.diagnosis import NoiseLevels, starting_point
 from gfimu.diagnosis.fit.linear import Point, energy_of, linearise, of_causes, with_residue
 from gfimu.diagnosis.terms.residue import Residue
 from sim.effects import EFFECTS

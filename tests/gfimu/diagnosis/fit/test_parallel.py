@@ -11,9 +11,10 @@ from pathlib import Path
 
 import pytest
 
+from gfimu.diagnosis import check_time, limited_to
 from gfimu.diagnosis.fit import parallel
 from gfimu.diagnosis.fit.parallel import each_apart, over_segments
-from gfimu.diagnosis.time_limit import TIME_LIMIT, check_time, limited_to, unlimited
+from gfimu.diagnosis.time_limit import TIME_LIMIT, unlimited
 
 
 def test_results_come_in_the_order_of_the_items():

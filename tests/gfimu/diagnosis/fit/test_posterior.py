@@ -10,13 +10,9 @@ from core_cases import cause_of, dense, dense_gaussian, lively, part_of, small_t
 from numpy.testing import assert_allclose
 from scipy.special import ndtr
 
-from gfimu.diagnosis.data.cosine_basis import NoiseLevels
+from gfimu.diagnosis import Columns, Drive, NoiseLevels, family_columns, starting_point
 from gfimu.diagnosis.data.rounding import Steps
-from gfimu.diagnosis.fit.learn import starting_point
 from gfimu.diagnosis.fit.posterior import condition, energy
-from gfimu.diagnosis.terms.columns import Columns
-from gfimu.diagnosis.terms.drive import Drive
-from gfimu.diagnosis.terms.library import family_columns
 from sim.effects import EFFECTS, make_effect
 
 EFFECTS_THERE = [make_effect("table_tilt", {"x_rad": 0.02, "y_rad": -0.01})]

@@ -9,8 +9,7 @@ import pytest
 from made_diagnoses import made_diagnosis
 from rerun_layout import check_layout
 
-from gfimu.diagnosis.report.picture import write_picture
-from gfimu.diagnosis.report.rig import DrawnRig
+from gfimu.diagnosis import DrawnRig, write_picture
 
 
 @pytest.mark.parametrize("rig", ["table", "carriage", "free"])

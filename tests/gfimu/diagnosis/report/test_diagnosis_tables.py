@@ -2,8 +2,8 @@
 
 from made_diagnoses import made_diagnosis
 
-from gfimu.base.declared import Table
-from gfimu.diagnosis.report.tables import diagnosis_tables
+from gfimu.base import Table
+from gfimu.diagnosis import diagnosis_tables
 
 
 def test_the_tables_name_every_cause_with_its_size():

@@ -9,8 +9,8 @@ import pytest
 from made_diagnoses import made_diagnosis
 
 from gfimu.commands.diagnose import drawn_rig
+from gfimu.diagnosis import DrawnRig
 from gfimu.diagnosis.report.picture import _motion
-from gfimu.diagnosis.report.rig import DrawnRig
 from sim.twin import Twin
 
 

@@ -14,10 +14,11 @@ from made_runs import PERIOD, made_view
 from PIL import Image
 
 from gfimu import AccelerometerArray, Chip
-from gfimu.base.results.colours import AFTER_ON_PAPER, BEFORE_ON_PAPER, chip_colour, css
+from gfimu.base import chip_colour
+from gfimu.base.results.colours import AFTER_ON_PAPER, BEFORE_ON_PAPER, css
+from gfimu.diagnosis import DrawnRig
 from gfimu.diagnosis.criticism.views.residuals import residual_views
 from gfimu.diagnosis.report import figures
-from gfimu.diagnosis.report.rig import DrawnRig
 from gfimu.visual.page.svg import themed
 
 CHANNELS = ("a11", "a12", "a13", "a21")

@@ -15,9 +15,9 @@ import pytest
 from made_diagnoses import made_diagnosis
 
 from gfimu import InputError, NamedCause
-from gfimu.diagnosis.report.folder import check_folder, write_diagnosis
-from gfimu.diagnosis.report.page import report_html
-from gfimu.diagnosis.report.plain_words import headline, next_steps, odds, parameter_texts, percent, story
+from gfimu.diagnosis import headline, next_steps, report_html, story, write_diagnosis
+from gfimu.diagnosis.report.folder import check_folder
+from gfimu.diagnosis.report.plain_words import odds, parameter_texts, percent
 
 VERDICTS = ("explained", "ambiguous", "unknown", "nothing_found")
 

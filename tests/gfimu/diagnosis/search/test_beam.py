@@ -11,9 +11,8 @@ from core_cases import cause_of, lively, small_twin, stretches_of
 from numpy.testing import assert_allclose
 
 from gfimu import AccelerometerArray
+from gfimu.diagnosis import Policy, starting_point
 from gfimu.diagnosis.fit.evidence import SCALES, log_evidence
-from gfimu.diagnosis.fit.learn import starting_point
-from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.beam import Blocks, leading_sets, promise
 from gfimu.diagnosis.search.screening import Signature, hypotheses_of, screen
 from sim.effects import make_effect

@@ -13,15 +13,12 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import lfilter
 
 from gfimu import AccelerometerArray
-from gfimu.diagnosis.data.table.spins import State
-from gfimu.diagnosis.fit.learn import starting_point
+from gfimu.diagnosis import Policy, State, starting_point
 from gfimu.diagnosis.fit.posterior import condition
-from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.explain import explain, reduced
 from gfimu.diagnosis.search.sets import Sets, excess, has_stalled, prune
-from sim.effects import EFFECTS
-from sim.effects.base import Effect, Size
-from sim.motions.motion import SplineSpin
+from sim import SplineSpin
+from sim.effects import EFFECTS, Effect, Size
 from sim.twin import Twin
 
 TWIN = small_twin()

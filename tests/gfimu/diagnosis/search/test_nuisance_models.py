@@ -8,10 +8,8 @@ import numpy as np
 import pytest
 from core_cases import small_twin, stretches_of
 
-from gfimu.diagnosis.fit.learn import starting_point
-from gfimu.diagnosis.policy import Policy
+from gfimu.diagnosis import Policy, starting_point, understand
 from gfimu.diagnosis.search import nuisance_models
-from gfimu.diagnosis.search.nuisance_models import understand
 from sim.effects import EFFECTS, make_effect
 
 

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from core_cases import cause_of, lively, small_twin, stretches_of
 
-from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.search.long_run import spread_over_runs, understand_any_length
+from gfimu.diagnosis import Policy, spread_over_runs, understand_any_length
 
 
 @pytest.mark.parametrize(

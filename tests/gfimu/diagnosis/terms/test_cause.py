@@ -9,7 +9,8 @@ import pytest
 from core_cases import cause_of, small_twin
 from numpy.testing import assert_allclose
 
-from gfimu.diagnosis.terms.cause import SMALLEST_POSITIVE, Cause, effects_of, mixing_of
+from gfimu.diagnosis import Cause, effects_of, mixing_of
+from gfimu.diagnosis.terms.cause import SMALLEST_POSITIVE
 from sim.effects import EFFECTS
 
 ARRAY = small_twin().array

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.testing import assert_allclose
 from scipy.signal import lfilter
 
-from gfimu.diagnosis.data.cosine_basis import CosineBasis, NoiseLevels
+from gfimu.diagnosis import CosineBasis, NoiseLevels
 
 PERIOD = 0.01
 

@@ -7,7 +7,7 @@ import pytest
 from core_cases import dense
 from numpy.testing import assert_allclose, assert_array_equal
 
-from gfimu.diagnosis.terms.columns import Columns
+from gfimu.diagnosis import Columns
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ import pytest
 from core_cases import cause_of, lively, small_twin, stretches_of
 from numpy.testing import assert_allclose
 
-from gfimu.diagnosis.fit.learn import starting_point
+from gfimu.diagnosis import starting_point
 from gfimu.diagnosis.fit.posterior import condition
 from gfimu.diagnosis.terms.jacobian import Jacobian, Reach, differentiate, measured_reach
 from gfimu.diagnosis.terms.spline import DEGREE, AngleSpline

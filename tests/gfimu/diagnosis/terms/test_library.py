@@ -9,10 +9,7 @@ import pytest
 from core_cases import cause_of, dense, lively, small_twin, stretches_of
 from numpy.testing import assert_allclose
 
-from gfimu.diagnosis.fit.learn import starting_point
-from gfimu.diagnosis.terms.cause import Cause, effects_of, mixing_of
-from gfimu.diagnosis.terms.library import cause_columns, family_columns
-from gfimu.diagnosis.terms.observed import observe
+from gfimu.diagnosis import Cause, cause_columns, effects_of, family_columns, mixing_of, observe, starting_point
 from sim.effects import EFFECTS, make_effect
 
 ARRAY = small_twin("cube12").array

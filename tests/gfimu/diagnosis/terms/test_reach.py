@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from gfimu import AccelerometerArray
-from gfimu.diagnosis.terms.reach import behind_wiring, disjoint
-from gfimu.motion.body_drive import BodyDrive
+from gfimu.diagnosis import behind_wiring, disjoint
+from gfimu.motion import BodyDrive
 from sim.effects import BODY_EFFECTS, make_effect
 from sim.twin import Twin
 

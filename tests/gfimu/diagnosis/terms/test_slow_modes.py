@@ -7,9 +7,8 @@ import pytest
 from core_cases import lively, part_of, small_twin, stretches_of
 from numpy.testing import assert_allclose
 
-from gfimu.diagnosis.data.cosine_basis import CosineBasis, NoiseLevels
+from gfimu.diagnosis import CosineBasis, NoiseLevels, starting_point
 from gfimu.diagnosis.data.rounding import Steps, rounded_likelihood
-from gfimu.diagnosis.fit.learn import starting_point
 from gfimu.diagnosis.fit.posterior import condition
 from gfimu.diagnosis.terms.coloured_noise import likeliest_flicker
 from gfimu.diagnosis.terms.slow_modes import SlowModes, WeighedModes, WeighedPowers

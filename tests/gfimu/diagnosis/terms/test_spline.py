@@ -7,7 +7,8 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.interpolate import BSpline
 
-from gfimu.diagnosis.data.table.spins import JoinedSpin, ScaledSpin, State
+from gfimu.diagnosis import State
+from gfimu.diagnosis.data.table.spins import JoinedSpin, ScaledSpin
 from gfimu.diagnosis.terms.spline import DEGREE, AngleSpline
 
 SPLINE = AngleSpline(-0.3, 0.07, 40)

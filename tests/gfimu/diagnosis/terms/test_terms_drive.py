@@ -9,8 +9,9 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.interpolate import BSpline
 
-from gfimu.diagnosis.terms.drive import FIRST_ROUGHNESS, LEAST_ROUGHNESS, MARGIN, Drive
-from gfimu.diagnosis.terms.spline import DEGREE, AngleSpline, State
+from gfimu.diagnosis import Drive, State
+from gfimu.diagnosis.terms.drive import FIRST_ROUGHNESS, LEAST_ROUGHNESS, MARGIN
+from gfimu.diagnosis.terms.spline import DEGREE, AngleSpline
 
 
 def made_drive(*, angle_std=1e-2, spacing=0.1, seed=1):

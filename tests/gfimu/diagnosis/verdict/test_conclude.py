@@ -8,16 +8,14 @@ import numpy as np
 import pytest
 from core_cases import cause_of, lively, small_twin
 
+from gfimu.diagnosis import Policy, make_stretches, prepare
 from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.criticism.series_tests import LackOfFit
-from gfimu.diagnosis.data.stretch import make_stretches
-from gfimu.diagnosis.diagnose import prepare
-from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.explain import explain
 from gfimu.diagnosis.search.nuisance_models import Understanding
 from gfimu.diagnosis.verdict.conclude import conclude, is_dominant, is_unknown, named_causes
 from sim.effects import make_effect
-from sim.trials.worlds.hidden import Measurement, measure
+from sim.trials import Measurement, measure
 
 TWIN = small_twin()
 HIDDEN = cause_of("table_tilt", TWIN.array, [1.0, -0.5])

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from gfimu import AccelerometerArray, NamedCause
+from gfimu.diagnosis import Policy
 from gfimu.diagnosis.criticism.gain import Gain
-from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.verdict.gate import impossible_sizes, judge, measurable
 from gfimu.diagnosis.verdict.parts import Residual, Unexplained
 from gfimu.diagnosis.verdict.wording import verdict_sentences

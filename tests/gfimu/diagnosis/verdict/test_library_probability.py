@@ -7,7 +7,7 @@ import pytest
 from made_diagnoses import made_diagnosis
 
 from gfimu import NamedCause
-from gfimu.diagnosis.policy import Policy
+from gfimu.diagnosis import Policy
 from gfimu.diagnosis.verdict.library import (
     LibraryEvidence,
     LibraryRule,

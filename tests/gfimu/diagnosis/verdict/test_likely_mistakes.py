@@ -8,12 +8,9 @@ import numpy as np
 import pytest
 
 from gfimu import AccelerometerArray
-from gfimu.diagnosis import diagnose
-from gfimu.diagnosis.diagnose import prepare
-from gfimu.diagnosis.fit.learn import predicted_by_reference
-from gfimu.diagnosis.verdict.likely_mistakes import likely_mistake
+from gfimu.diagnosis import diagnose, likely_mistake, predicted_by_reference, prepare
 from sim.effects import make_effect
-from sim.trials.worlds.hidden import Measurement, measure
+from sim.trials import Measurement, measure
 from sim.twin import Twin
 
 CUBE = AccelerometerArray.load("cube12")

@@ -10,10 +10,9 @@ from core_cases import cause_of, lively, small_twin, stretches_of
 from numpy.testing import assert_allclose
 
 from gfimu import NamedCause
+from gfimu.diagnosis import Policy, starting_point
 from gfimu.diagnosis.fit.gauss_newton import Fit
-from gfimu.diagnosis.fit.learn import starting_point
 from gfimu.diagnosis.fit.linear import Point
-from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.explain import Explanation
 from gfimu.diagnosis.search.screening import screen
 from gfimu.diagnosis.verdict.naming import (

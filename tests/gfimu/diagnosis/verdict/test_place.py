@@ -9,13 +9,8 @@ import pytest
 from few_effects import having
 
 from gfimu import AccelerometerArray
-from gfimu.diagnosis import diagnose
-from gfimu.diagnosis.data.stretch import make_stretches
-from gfimu.diagnosis.diagnose import prepare
-from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.report.page import report_html
-from gfimu.diagnosis.verdict.place import with_place
-from sim.trials.worlds.hidden import Measurement, measure
+from gfimu.diagnosis import Policy, diagnose, make_stretches, prepare, report_html, with_place
+from sim.trials import Measurement, measure
 from sim.twin import Twin
 
 TWIN = having(

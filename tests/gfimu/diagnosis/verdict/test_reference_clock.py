@@ -9,8 +9,7 @@ import pytest
 from made_diagnoses import made_diagnosis
 
 from gfimu import NamedCause
-from gfimu.diagnosis.verdict.parts import ReferenceClock
-from gfimu.diagnosis.verdict.sample_notes import with_reference_clock
+from gfimu.diagnosis import ReferenceClock, with_reference_clock
 from sim.twin import Twin
 
 TWIN = Twin.load("cube12_turntable")

@@ -9,7 +9,7 @@ import pytest
 from made_diagnoses import made_diagnosis
 from made_runs import made_run
 
-from gfimu.diagnosis.verdict.sample_notes import with_sample_notes
+from gfimu.diagnosis import with_sample_notes
 
 RUN = made_run(np.zeros((100, 2)))
 

@@ -10,8 +10,7 @@ from made_bodies import TWIN
 
 from gfimu.diagnosis.search.screening import Screening, Signature
 from gfimu.diagnosis.verdict.undetermined import Undetermined, undetermined, undetermined_sentence
-from sim.effects import BODY_EFFECTS
-from sim.effects.base import Size
+from sim.effects import BODY_EFFECTS, Size
 
 ARRAY = TWIN.array
 BIAS = BODY_EFFECTS["bias"]

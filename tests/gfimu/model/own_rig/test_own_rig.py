@@ -12,9 +12,9 @@ import pytest
 
 import gfimu
 from gfimu import InputError
-from gfimu.diagnosis.terms.spline import State
-from gfimu.model.generic_basis import OF_READING
-from gfimu.model.own_rig import Cause, Parameter, SimulatorModel, bias_cause, gain_cause, load_model
+from gfimu.diagnosis import State
+from gfimu.model import OF_READING, load_model
+from gfimu.model.own_rig import Cause, Parameter, SimulatorModel, bias_cause, gain_cause
 from gfimu.model.own_rig.places import chip_patterns
 from gfimu.model.world_model import BasisUnits
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gfimu import AccelerometerArray, InputError, specific_force
-from gfimu.base.units import STANDARD_GRAVITY
+from gfimu.base import STANDARD_GRAVITY
 from gfimu.motion.impact.criteria import head_injury_criterion
 from gfimu.motion.impact.event import ImpactSettings, measure_impact, time_zero
 from gfimu.recording import Recording

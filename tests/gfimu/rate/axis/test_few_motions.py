@@ -3,7 +3,7 @@
 import numpy as np
 
 from gfimu import AccelerometerArray, Chip
-from gfimu.rate.axis.few_motions import few_motions_text
+from gfimu.rate import few_motions_text
 
 
 def test_one_chip_gives_its_force_and_names_the_axis_option():

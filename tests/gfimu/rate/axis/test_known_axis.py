@@ -8,10 +8,9 @@ from turning import NOISE, RATE, array_of, turned
 
 import gfimu
 from gfimu import AccelerometerArray, Chip, GeometryError, InputError, TurningAxis
-from gfimu.motion.attitude import to_rotation
-from gfimu.motion.axis_estimation import estimate_about_axis
-from gfimu.rate.axis.accuracy.bounds import axis_bounds
-from gfimu.recording.mapped import mapped_recording
+from gfimu.motion import estimate_about_axis, to_rotation
+from gfimu.rate import axis_bounds
+from gfimu.recording import mapped_recording
 
 ONE = array_of((0.1, 0.0, 0.02))
 TWO = array_of((0.02, 0.0, 0.0), (0.17, 0.0, 0.0))

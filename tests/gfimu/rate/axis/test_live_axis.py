@@ -8,8 +8,8 @@ from turning import array_of, turned
 
 import gfimu
 from gfimu import InputError, TurningAxis
-from gfimu.array.turning_axis import AxisUncertainty
-from gfimu.rate.axis.live import LiveAxisFilter
+from gfimu.array import AxisUncertainty
+from gfimu.rate import LiveAxisFilter
 
 ONE = array_of((0.1, 0.0, 0.02))
 TWO = array_of((0.02, 0.0, 0.0), (0.17, 0.0, 0.0))

@@ -10,14 +10,10 @@ from scipy import stats
 from turning import NOISE, array_of, mounted
 
 from gfimu import AccelerometerArray, InputError, TurningAxis
-from gfimu.array.turning_axis import AxisUncertainty
-from gfimu.motion.axis_estimation import estimate_about_axis
-from gfimu.rate.axis.channels import AxisChannels
-from gfimu.rate.axis.mounting import Mounting
-from gfimu.rate.axis.mounting_fit import fit_mounting
-from gfimu.rate.axis.problem import AxisProblem, Settings
-from gfimu.recording import Recording
-from gfimu.recording.mapped import mapped_recording
+from gfimu.array import AxisUncertainty
+from gfimu.motion import estimate_about_axis
+from gfimu.rate import AxisChannels, AxisProblem, Mounting, Settings, fit_mounting
+from gfimu.recording import Recording, mapped_recording
 
 ONE = array_of((0.1, 0.0, 0.02))
 TWO = array_of((0.02, 0.0, 0.0), (0.17, 0.0, 0.0))

@@ -5,7 +5,7 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from gfimu import AccelerometerArray, Chip
-from gfimu.base.units import STANDARD_GRAVITY
+from gfimu.base import STANDARD_GRAVITY
 from gfimu.recording import Recording
 
 RATE = 100.0

@@ -10,9 +10,7 @@ import pytest
 
 import gfimu
 from gfimu import InputError, RecordingWarning, UnitError, load_map
-from gfimu.recording.importing import inspect_file
-from gfimu.recording.importing.oddities import oddities
-from gfimu.recording.mapped import mapped_recording
+from gfimu.recording import inspect_file, mapped_recording, oddities
 
 MAP = 'name = "m"\n[time]\ncolumn = "t"\n[channels]\na11 = { column = "x", unit = "g" }\n'
 
@@ -160,7 +158,7 @@ def test_rails_corrupt_values_and_noise_are_reported():
 
 
 def test_units_are_read_as_people_write_them():
-    from gfimu.recording.importing.notation import factor_of
+    from gfimu.recording import factor_of
 
     for text in ("m/s^2", "m/s²", "m s^-2", "m_s2", "M/S2"):
         assert factor_of(text, "acceleration") == 1.0

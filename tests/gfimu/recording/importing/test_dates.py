@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gfimu.recording.importing.dates import nanoseconds_of
+from gfimu.recording import nanoseconds_of
 
 FORMS = {
     "ISO with zone": ("2024-05-17T10:25:14.123Z", "2024-05-17T10:25:14.123"),

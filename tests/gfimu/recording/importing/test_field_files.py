@@ -11,9 +11,7 @@ import pytest
 
 import gfimu
 from gfimu import GfimuError, InputError, RecordingWarning, load_map
-from gfimu.recording.importing import inspect_file
-from gfimu.recording.importing.notation import factor_of
-from gfimu.recording.mapped import mapped_recording
+from gfimu.recording import factor_of, inspect_file, mapped_recording
 
 GYRO = ("gyro_x_rad_s", "gyro_y_rad_s", "gyro_z_rad_s")
 

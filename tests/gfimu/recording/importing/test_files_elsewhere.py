@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from gfimu import InputError
-from gfimu.recording.importing.readers import read_foreign
+from gfimu.recording import read_foreign
 
 h5py = pytest.importorskip("h5py")
 

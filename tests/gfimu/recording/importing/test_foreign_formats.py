@@ -6,11 +6,9 @@ import pytest
 
 from gfimu import ColumnMap, InputError, MappedFile, RecordingWarning, load_map
 from gfimu.base.units import REFERENCE_UNITS
-from gfimu.recording import Recording
-from gfimu.recording.formats import open_run
-from gfimu.recording.importing import inspect_file, list_maps
-from gfimu.recording.importing.column_map import REFERENCE_KINDS, ColumnSpec, TimeSpec
-from gfimu.recording.mapped import mapped_recording
+from gfimu.recording import ColumnSpec, Recording, inspect_file, mapped_recording, open_run
+from gfimu.recording.importing import list_maps
+from gfimu.recording.importing.column_map import REFERENCE_KINDS, TimeSpec
 
 GYRO = ["gyro_x_rad_s", "gyro_y_rad_s", "gyro_z_rad_s"]
 

@@ -8,9 +8,7 @@ import pytest
 
 import gfimu
 from gfimu import InputError
-from gfimu.recording.importing import inspect_file
-from gfimu.recording.importing.guessing.likely_reference import likely_references, reference_remedy
-from gfimu.recording.importing.raw_table import RawTable
+from gfimu.recording import RawTable, inspect_file, likely_references, reference_remedy
 
 RATE = np.linspace(-3.0, 3.0, 50)
 

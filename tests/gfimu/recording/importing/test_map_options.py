@@ -9,9 +9,8 @@ import typer
 
 import gfimu
 from gfimu import InputError, load_map
-from gfimu.commands.shell.program import program
-from gfimu.recording.importing.column_map import ColumnSpec
-from gfimu.recording.mapped import mapped_recording
+from gfimu.commands import program
+from gfimu.recording import ColumnSpec, mapped_recording
 
 TIME = ["time.column=ms", "time.unit=ms"]
 CHIP = ["unit=g", "channels.a11=ax", "channels.a12=ay", "channels.a13=az"]

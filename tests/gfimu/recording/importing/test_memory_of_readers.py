@@ -16,9 +16,8 @@ import pytest
 
 import gfimu
 from gfimu import InputError, read_mimu4444
-from gfimu.base.files.memory import MemoryLimit, MemoryLimitError, with_memory
-from gfimu.recording import Recording
-from gfimu.recording.importing.readers import read_foreign
+from gfimu.base import MemoryLimit, MemoryLimitError, with_memory
+from gfimu.recording import Recording, read_foreign
 
 LIMIT = "20MB"
 ENOUGH = "600MB"

@@ -8,8 +8,7 @@ from numpy.testing import assert_allclose
 
 import gfimu
 from gfimu import InputError, RecordingWarning, load_map
-from gfimu.recording.importing.piece import nearest_rows
-from gfimu.recording.timing.reference_times import reference_on_rows, reference_series
+from gfimu.recording import nearest_rows, reference_on_rows, reference_series
 
 ACCEL = np.arange(0.0, 10.0, 0.01)
 GYRO = np.arange(0.003, 10.0, 0.02)

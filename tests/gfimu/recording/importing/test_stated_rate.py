@@ -2,8 +2,7 @@
 
 import pytest
 
-from gfimu.recording.importing.guessing.times import RATES, stated_rate
-from gfimu.recording.importing.raw_table import RawTable
+from gfimu.recording import RATES, RawTable, stated_rate
 
 
 def rate_of(line):

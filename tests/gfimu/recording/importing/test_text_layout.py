@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from gfimu import InputError
-from gfimu.recording.importing.column_map import TextSpec
-from gfimu.recording.importing.readers.text import table_of_text
+from gfimu.recording import TextSpec, table_of_text
 
 LAYOUTS = {
     "comma": ("t,ax,ay\n0.0,1.5,2\n0.1,1.6,3\n", ("t", "ax", "ay")),

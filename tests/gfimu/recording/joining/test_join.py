@@ -8,7 +8,7 @@ from gfimu import AccelerometerArray, InputError
 from gfimu.recording import Recording
 from gfimu.recording.joining import ReferenceSeries, join_reference, open_reference
 from gfimu.recording.joining.signals import functions_of
-from sim.trials.worlds.hidden import Measurement, measure
+from sim.trials import Measurement, measure
 from sim.twin import Twin
 
 TWIN = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")

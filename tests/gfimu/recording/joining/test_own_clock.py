@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from gfimu import AccelerometerArray
-from gfimu.recording.joining import displaced_reference
+from gfimu.recording import displaced_reference
 from sim.effects import make_effect
 from sim.scenarios import Scenario
 from sim.simulation import simulate
-from sim.trials.worlds.hidden import Measurement, measure
+from sim.trials import Measurement, measure
 from sim.twin import Twin
 
 TWIN = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")

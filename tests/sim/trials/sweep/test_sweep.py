@@ -11,10 +11,9 @@ import pytest
 from sweep_cases import always_dies, dies_once, quick
 
 from gfimu import InputError
+from sim.trials import Design, load_plan
 from sim.trials.sweep.dataset import Dataset
-from sim.trials.sweep.design import Design
 from sim.trials.sweep.engine import Workers, run_campaign
-from sim.trials.sweep.plan import load_plan
 from sim.trials.sweep.pool import open_pool
 from sim.trials.sweep.summary import failures, grouped
 

@@ -9,10 +9,8 @@ import pyarrow as pa
 import pytest
 from headless_browser import headless_browser
 
-from gfimu.base.results.colours import PAGE
-from sim.trials.sweep.design import Design
-from sim.trials.sweep.picture import campaign_picture
-from sim.trials.sweep.plan import load_plan
+from gfimu.base import PAGE
+from sim.trials import Design, campaign_picture, load_plan
 
 PLAN = """
 design = "random"

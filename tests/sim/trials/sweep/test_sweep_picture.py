@@ -6,10 +6,8 @@ import pytest
 from matplotlib.figure import Figure
 
 from gfimu import InputError
-from sim.trials.sweep.design import Design
+from sim.trials import Design, campaign_picture, load_plan
 from sim.trials.sweep.panels import draw_over, label
-from sim.trials.sweep.picture import campaign_picture
-from sim.trials.sweep.plan import load_plan
 from sim.trials.sweep.summary import numbers
 
 PLAN = """

@@ -5,9 +5,7 @@ import pyarrow as pa
 import pytest
 from scipy.stats import sobol_indices
 
-from sim.trials.sweep.design import Design
-from sim.trials.sweep.plan import load_plan
-from sim.trials.sweep.sensitivity import seed_shares, sensitivities
+from sim.trials import Design, load_plan, seed_shares, sensitivities
 
 ISHIGAMI_FIRST, ISHIGAMI_TOTAL = (0.3139, 0.4424, 0.0), (0.5576, 0.4424, 0.2437)
 """Of sin x1 + 7 sin² x2 + 0.1 x3⁴ sin x1, x in ±π (Ishigami & Homma, 1990)."""

@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
+from sim.trials import Measurement, WorldFactory
 from sim.trials.campaign.worlds import measure_case
 from sim.trials.sweep.design import Case
-from sim.trials.worlds.factory import WorldFactory
-from sim.trials.worlds.hidden import Measurement
 from sim.twin import Twin
 
 SEED = 12345

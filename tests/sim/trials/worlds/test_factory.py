@@ -6,8 +6,7 @@ import pytest
 from gfimu import InputError
 from sim import forward
 from sim.effects import make_effect
-from sim.trials.worlds.factory import WorldFactory
-from sim.trials.worlds.hidden import Measurement, measure, random_profile
+from sim.trials import Measurement, WorldFactory, measure, random_profile
 from sim.twin import Twin
 
 SETTING = Measurement(duration=20.0)

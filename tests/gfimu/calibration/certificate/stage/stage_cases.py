@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from gfimu.calibration.error_model import ErrorModel
+from gfimu.calibration import ErrorModel, Observations
 from gfimu.calibration.multi_position import multi_position
-from gfimu.calibration.observations import Observations
 from gfimu.calibration.recursive import recursive
 from gfimu.calibration.six_position import six_position
 from gfimu.calibration.twelve_position import twelve_position

@@ -5,13 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gfimu.calibration.certificate.certify import certify
+from gfimu.calibration import Observations, Stage, certify, stage_components
 from gfimu.calibration.certificate.quantities import stated_quantities
-from gfimu.calibration.certificate.stage.components import stage_components
 from gfimu.calibration.certificate.stage.simulated_calibration import poses_of
-from gfimu.calibration.certificate.stage.stage import Stage
 from gfimu.calibration.certificate.stage.stage_errors import draw_errors, specific_force
-from gfimu.calibration.observations import Observations
 from tests.gfimu.calibration.calibration_cases import GRAVITY
 from tests.gfimu.calibration.certificate.stage.stage_cases import METHODS, SKEW, calibration_of
 

@@ -10,8 +10,7 @@ gives.
 
 import numpy as np
 
-from gfimu.calibration.certificate.stage.stage import Stage
-from gfimu.calibration.certificate.stage.type_b import type_b
+from gfimu.calibration import Stage, type_b
 from tests.gfimu.calibration.calibration_cases import GRAVITY
 from tests.gfimu.calibration.certificate.stage.stage_cases import calibration_of, intrinsic
 

@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 
-from gfimu.calibration.certificate.certify import certify
-from gfimu.calibration.certificate.stage.components import stage_components
-from gfimu.calibration.certificate.stage.stage import Stage
+from gfimu.calibration import Stage, certify, stage_components
 from tests.gfimu.calibration.certificate.stage.stage_cases import METHODS, calibration_of
 
 STAGE = Stage(stage="table no. 2", source="report 7", pose_tilt_std_rad=1e-3, angle_step_std_rad=1e-4)

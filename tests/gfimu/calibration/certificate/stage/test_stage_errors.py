@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gfimu import InputError
-from gfimu.calibration.certificate.stage.stage import Stage
+from gfimu.calibration import Stage
 from gfimu.calibration.certificate.stage.stage_errors import (
     SOURCES,
     StageErrors,

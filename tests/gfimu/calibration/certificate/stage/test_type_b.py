@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 
 from gfimu import AccelerometerArray
-from gfimu.base.units import STANDARD_GRAVITY
+from gfimu.base import STANDARD_GRAVITY
+from gfimu.calibration import ErrorModel, Stage, type_b
 from gfimu.calibration.array_static import array_static
 from gfimu.calibration.certificate.stage.simulated_calibration import calibrate_under, poses_of
-from gfimu.calibration.certificate.stage.stage import Stage
 from gfimu.calibration.certificate.stage.stage_errors import axis_angles, draw_errors
-from gfimu.calibration.certificate.stage.type_b import FORMULA_GRAVITY_STD, STANDARD_GRAVITY_STD, type_b
-from gfimu.calibration.error_model import ErrorModel
+from gfimu.calibration.certificate.stage.type_b import FORMULA_GRAVITY_STD, STANDARD_GRAVITY_STD
 from tests.gfimu.calibration.calibration_cases import FACES, GRAVITY, MULTI, chips_in_gauge
 from tests.gfimu.calibration.calibration_cases import poses_of as array_poses
 from tests.gfimu.calibration.certificate.stage.stage_cases import METHODS, PERFECT, calibration_of, intrinsic, values
