@@ -22,10 +22,9 @@ from gfimu import GfimuError
 from gfimu.base import STANDARD_GRAVITY
 from gfimu.diagnosis import PreparedRuns, diagnose, predicted_by_reference
 from gfimu.recording import Recording
-from sim.trials import draw_world
+from sim.trials import Dataset, draw_world
 from sim.trials.benchmark.generators.foreign_effects import FOREIGN
 from sim.trials.study.outcome import outcome_of, processor_time
-from sim.trials.sweep.dataset import Dataset
 from sim.trials.sweep.engine import run_campaign
 from sim.trials.sweep.executors import open_workers
 from sim.trials.sweep.plan import PlanFile

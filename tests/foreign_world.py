@@ -19,7 +19,7 @@ from scipy.interpolate import CubicSpline
 from gfimu import AccelerometerArray
 from gfimu.base import STANDARD_GRAVITY
 from sim import SplineSpin, forward
-from sim.trials import Case, Measurement, measure, random_profile
+from sim.trials import Measurement, measure, random_profile
 from sim.trials.benchmark.generators.foreign_effects import FOREIGN, Motion, acting, noise_free
 from sim.trials.benchmark.generators.foreign_world import (
     TOP,
@@ -31,6 +31,7 @@ from sim.trials.benchmark.generators.foreign_world import (
 )
 from sim.trials.benchmark.generators.independent_table import INERTIA, LEAD
 from sim.trials.benchmark.generators.independent_world import HiddenRun, Setting
+from sim.trials.study.cases import Case
 from sim.twin import Twin
 
 __all__ = ["CASES", "SIZES", "hide", "hide_in_campaign", "new_recording"]

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import gfimu
-from gfimu.array.parts.part_file import PartFile
-from gfimu.budget.tolerances.words import room_for
+from gfimu.array import PartFile
+from gfimu.budget import room_for
 
 EDGES = {"cube50": 0.05, "cube12": 0.1, "cube200": 0.2}
 
@@ -90,7 +90,7 @@ def campaign_plan(page, folder, **changes):
 
 def errors(folder, plan, monkeypatch):
     """Errors of ω in mrad/s by array, part and calibration."""
-    from sim.trials.sweep.dataset import Dataset
+    from sim.trials import Dataset
 
     monkeypatch.chdir(folder)
     out = folder / f"out{len(list(folder.iterdir()))}"

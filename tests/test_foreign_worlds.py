@@ -22,7 +22,7 @@ from foreign_world import (
 from gfimu import AccelerometerArray
 from sim import SplineSpin, forward
 from sim.effects import EFFECTS
-from sim.trials import Case, draw_world
+from sim.trials import draw_world
 from sim.trials.benchmark import generators
 from sim.trials.benchmark.generators.foreign_effects import (
     FOREIGN,
@@ -37,6 +37,7 @@ from sim.trials.benchmark.generators.foreign_effects import (
 from sim.trials.benchmark.generators.foreign_world import distance, sized, table_motion
 from sim.trials.benchmark.generators.independent_effects import CHANNELS, DRAWS, EXOTICS
 from sim.trials.benchmark.generators.independent_world import Setting
+from sim.trials.study.cases import Case
 from sim.twin import Twin
 
 FOLDER = Path(generators.__file__).parent

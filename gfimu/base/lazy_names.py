@@ -19,8 +19,9 @@ def declared_names(
 ) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
     """Return ``__getattr__``, ``__dir__`` and ``__all__`` of a package that imports its names for type checkers only.
 
-    The list is the block ``if TYPE_CHECKING:`` of the package's own source, which type checkers and editors read, so
-    that a public name is one line: ``from gfimu.array.array import Chip as Chip``.
+    The list is the block ``if TYPE_CHECKING:`` of the package's own source, which type checkers and editors read: a
+    file and its names a line, ``from gfimu.array.array import AccelerometerArray, Chip``. The public face `gfimu`
+    writes ``Chip as Chip``, for that alone makes a name public for the type checker of a user.
 
     Parameters
     ----------
@@ -50,4 +51,4 @@ def homes_of(package: str) -> dict[str, str]:
     source = Path(str(sys.modules[package].__file__)).read_text(encoding="utf-8")
     blocks = [node for node in ast.parse(source).body if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node)]
     imports = [node for block in blocks for node in block.body if isinstance(node, ast.ImportFrom)]
-    return {alias.asname: str(node.module) for node in imports for alias in node.names if alias.asname}
+    return {alias.asname or alias.name: str(node.module) for node in imports for alias in node.names}

@@ -10,17 +10,21 @@ from typing import TYPE_CHECKING
 from gfimu.base.lazy_names import declared_names
 
 if TYPE_CHECKING:
-    from gfimu.calibration.certificate.certify import certify as certify
-    from gfimu.calibration.certificate.page import certificate_html as certificate_html
-    from gfimu.calibration.certificate.stage.components import stage_components as stage_components
-    from gfimu.calibration.certificate.stage.stage import Stage as Stage
-    from gfimu.calibration.certificate.stage.type_b import type_b as type_b
-    from gfimu.calibration.check_poses import check_on_poses as check_on_poses
-    from gfimu.calibration.error_model import ErrorModel as ErrorModel
-    from gfimu.calibration.error_model import free_elements as free_elements
-    from gfimu.calibration.known_poses import levelling_covariance as levelling_covariance
-    from gfimu.calibration.observations import Observations as Observations
-    from gfimu.calibration.registry import METHODS as METHODS
-    from gfimu.calibration.run_file import open_uncalibrated as open_uncalibrated
+    from gfimu.calibration.certificate.certify import certify
+    from gfimu.calibration.certificate.comparison import compare
+    from gfimu.calibration.certificate.page import certificate_html
+    from gfimu.calibration.certificate.stage.components import stage_components
+    from gfimu.calibration.certificate.stage.stage import Stage
+    from gfimu.calibration.certificate.stage.type_b import type_b
+    from gfimu.calibration.check_poses import check_on_poses
+    from gfimu.calibration.error_model import ErrorModel, free_elements
+    from gfimu.calibration.imu_tk import read_text_triad
+    from gfimu.calibration.known_poses import levelling_covariance
+    from gfimu.calibration.methods import calibrate
+    from gfimu.calibration.multi_position import multi_position_gyro
+    from gfimu.calibration.observations import Observations, averaged_poses, every_sample
+    from gfimu.calibration.registry import METHODS
+    from gfimu.calibration.run_file import open_uncalibrated
+    from gfimu.calibration.spin import SpinPolicy
 else:
     __getattr__, __dir__, __all__ = declared_names(__name__)

@@ -9,11 +9,9 @@ from typing import TYPE_CHECKING
 from gfimu.base.lazy_names import declared_names
 
 if TYPE_CHECKING:
-    from gfimu.commands.shell.command_group import CommandGroup as CommandGroup
-    from gfimu.commands.shell.declare import command_of as command_of
-    from gfimu.commands.shell.output import print_table as print_table
-    from gfimu.commands.shell.printing import print_blocks as print_blocks
-    from gfimu.commands.shell.program import main as main
-    from gfimu.commands.shell.program import program as program
+    from gfimu.commands.shell.command_group import CommandGroup
+    from gfimu.commands.shell.output import print_table
+    from gfimu.commands.shell.printing import print_blocks
+    from gfimu.commands.shell.program import main, program
 else:
     __getattr__, __dir__, __all__ = declared_names(__name__)

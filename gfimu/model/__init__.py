@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING
 from gfimu.base.lazy_names import declared_names
 
 if TYPE_CHECKING:
-    from gfimu.model.generic_basis import OF_READING as OF_READING
-    from gfimu.model.own_rig import load_model as load_model
-    from gfimu.model.world_model import BodyModel as BodyModel
-    from gfimu.model.world_model import SpinState as SpinState
+    from gfimu.model.generic_basis import OF_READING
+    from gfimu.model.own_rig import load_model
+    from gfimu.model.world_model import BodyModel, SpinState
 else:
     __getattr__, __dir__, __all__ = declared_names(__name__)

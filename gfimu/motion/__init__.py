@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING
 from gfimu.base.lazy_names import declared_names
 
 if TYPE_CHECKING:
-    from gfimu.motion.attitude import from_rotation as from_rotation
-    from gfimu.motion.attitude import to_rotation as to_rotation
-    from gfimu.motion.axis_estimation import estimate_about_axis as estimate_about_axis
-    from gfimu.motion.body_drive import BodyDrive as BodyDrive
-    from gfimu.motion.rest_navigation import navigate_with_rest as navigate_with_rest
+    from gfimu.motion.attitude import ATTITUDE_METHODS, from_rotation, table_angle, to_rotation, twist_angle
+    from gfimu.motion.axis_estimation import estimate_about_axis
+    from gfimu.motion.body_drive import BodyDrive
+    from gfimu.motion.rest_navigation import navigate_with_rest
 else:
     __getattr__, __dir__, __all__ = declared_names(__name__)

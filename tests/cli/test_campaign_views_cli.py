@@ -11,7 +11,7 @@ import time
 import pytest
 from matplotlib.image import imread
 
-from sim.trials.sweep.dataset import Dataset
+from sim.trials import Dataset
 from sim.trials.sweep.pace import running
 
 PLAN = """

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import gfimu
-from gfimu.budget.drift.closed_forms import position_error
+from gfimu.budget import position_error
 
 MG = 9.80665e-3
 

@@ -13,8 +13,9 @@ import typer
 from every_item import every
 
 import gfimu
-from gfimu.base import OutputFile, OutputFolder
-from gfimu.commands import command_of, program
+from gfimu.base.files.outputs import OutputFile, OutputFolder
+from gfimu.commands import program
+from gfimu.commands.shell.declare import command_of
 
 OTHER_WORDS = {
     "--from": "source",

@@ -9,10 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from firmware_bridge import TICKS_PER_SECOND, Adxl345, Adxl345Options, image_path
-from firmware_bridge.frames.commands import sample_at
-from firmware_bridge.lpc1768.build import SOURCES
-from firmware_bridge.lpc1768.elf import ElfImage
+from firmware_bridge import SOURCES, TICKS_PER_SECOND, Adxl345, Adxl345Options, ElfImage, image_path, sample_at
 
 _FLAGS = (
     "-target", "thumb-freestanding-eabi", "-mcpu=cortex_m3", "-mthumb", "-std=gnu11", "-O2", "-g0", "-ffreestanding",

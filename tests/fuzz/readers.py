@@ -46,9 +46,8 @@ def targets(folder: Path) -> dict[str, Target]:
     from gfimu import AccelerometerArray, load_calibration, load_map, open_recording
     from gfimu.array import Part
     from gfimu.base import list_models
-    from gfimu.calibration.imu_tk import read_text_triad
-    from gfimu.recording import inspect_file, open_run
-    from gfimu.recording.joining import open_reference
+    from gfimu.calibration import read_text_triad
+    from gfimu.recording import inspect_file, open_reference, open_run
     from sim import array_from_mjcf
     from sim.scenarios import Scenario
     from sim.twin import Twin
@@ -131,7 +130,7 @@ def _own_recordings(folder: Path) -> dict[str, tuple[tuple[bytes, str], ...]]:
 
 def _foreign(folder: Path, foreign: Any, field: Any) -> tuple[tuple[tuple[bytes, str], ...], Mapping[str, Any]]:
     """Return foreign text files, and foreign files of other formats by the name of the format."""
-    from gfimu.recording.importing.readers.registry import format_of
+    from gfimu.recording import format_of
 
     found: dict[str, list[tuple[bytes, str]]] = {
         key: [] for key in ("text", "json", "zip", "excel", "matlab", "hdf5", "ulog", "mcap", "rosbag")
@@ -229,7 +228,7 @@ def _sent() -> tuple[tuple[bytes, str], ...]:
 
 def _frames(path: Path) -> None:
     from firmware_bridge import SampleDecoder
-    from gfimu.base.files.input_file import read_bytes
+    from gfimu.base import read_bytes
 
     decoder = SampleDecoder()
     data = read_bytes(path)

@@ -17,9 +17,9 @@ from pathlib import Path
 from typing import Any
 
 from sim.effects import EFFECTS
-from sim.trials import Case
 from sim.trials.benchmark.generators.foreign_effects import FOREIGN
 from sim.trials.benchmark.generators.independent_effects import EXOTICS
+from sim.trials.study.cases import Case
 
 GENERATORS = Path(__file__).resolve().parents[2] / "sim" / "trials" / "benchmark" / "generators"
 SOURCES = {

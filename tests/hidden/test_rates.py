@@ -8,7 +8,8 @@ import pytest
 from hidden_table import SOURCES
 from scipy.stats import binom
 
-from sim.trials.study.cases import EXOTICS, STUDIES, study_cases
+from sim.trials import study_cases
+from sim.trials.study.cases import EXOTICS, STUDIES
 from sim.trials.study.outcome import run_case
 from sim.trials.study.tally import score
 

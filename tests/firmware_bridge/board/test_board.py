@@ -12,11 +12,19 @@ import pytest
 
 pytest.importorskip("unicorn", reason="the emulator is in the extra 'firmware'")
 
-from firmware_bridge import TICKS_PER_SECOND, SampleDecoder
-from firmware_bridge.adxl345.registers import LineFault
-from firmware_bridge.board.faults import BoardFault, FaultKind
-from firmware_bridge.frames.commands import Command, encode_command, set_range, set_rate
-from firmware_bridge.frames.decoder import Samples, Status
+from firmware_bridge import (
+    TICKS_PER_SECOND,
+    BoardFault,
+    Command,
+    FaultKind,
+    LineFault,
+    SampleDecoder,
+    Samples,
+    Status,
+    encode_command,
+    set_range,
+    set_rate,
+)
 
 KINDS = ("python", "fast")
 IMAGES = Path(__file__).parents[1] / "images"

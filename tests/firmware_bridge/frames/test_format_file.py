@@ -13,9 +13,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from firmware_bridge import SampleDecoder, TcpPort, record
+from firmware_bridge import SampleDecoder, Samples, TcpPort, frame_format, record
 from firmware_bridge.frames.checksum import CHECKSUMS
-from firmware_bridge.frames.decoder import Samples, frame_format
 from firmware_bridge.frames.delimited import decode_cobs, decode_slip
 from firmware_bridge.frames.format_file import load_format
 from gfimu import InputError

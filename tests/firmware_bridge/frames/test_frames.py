@@ -10,10 +10,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from firmware_bridge import FORMATS, SampleDecoder, encode_samples
-from firmware_bridge.frames.checksum import crc16, crc16_rows
-from firmware_bridge.frames.commands import parse_message
-from firmware_bridge.frames.decoder import LPC1768_DTYPE, FrameType, Samples, Status, encode_message, frame_format
+from firmware_bridge import (
+    FORMATS,
+    LPC1768_DTYPE,
+    FrameType,
+    SampleDecoder,
+    Samples,
+    Status,
+    crc16,
+    crc16_rows,
+    encode_message,
+    encode_samples,
+    frame_format,
+    parse_message,
+)
 from gfimu import InputError, read_mimu4444
 
 FRAME = LPC1768_DTYPE.itemsize

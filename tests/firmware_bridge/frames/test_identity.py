@@ -5,8 +5,7 @@ import struct
 import numpy as np
 import pytest
 
-from firmware_bridge.frames.commands import parse_message, set_rate
-from firmware_bridge.frames.decoder import LPC1768_DTYPE, FrameType, encode_message
+from firmware_bridge import LPC1768_DTYPE, FrameType, encode_message, parse_message, set_rate
 from gfimu import InputError
 
 GIVEN = {"rate": 100, "code": 10, "format": 11, "baud": 0, "present": 15, "cause": 1, "streaming": 1, "sensors": 4}

@@ -10,9 +10,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from firmware_bridge import FORMATS, SampleDecoder, record
-from firmware_bridge.frames.commands import Dialogue, Identity, Reply, Result, set_rate
-from firmware_bridge.frames.decoder import FrameFormat, frame_format
+from firmware_bridge import FORMATS, Identity, Reply, Result, SampleDecoder, frame_format, record, set_rate
+from firmware_bridge.frames.commands import Dialogue
+from firmware_bridge.frames.decoder import FrameFormat
 from firmware_bridge.frames.packets import PacketLayout
 from gfimu import InputError
 from gfimu.recording import Recording

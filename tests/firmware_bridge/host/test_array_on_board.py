@@ -11,10 +11,18 @@ from typing import Self
 import numpy as np
 import pytest
 
-from firmware_bridge import FORMATS, SampleDecoder, TcpPort, encode_samples
+from firmware_bridge import (
+    FORMATS,
+    ArrayName,
+    Command,
+    FrameType,
+    SampleDecoder,
+    TcpPort,
+    encode_message,
+    encode_samples,
+    parse_message,
+)
 from firmware_bridge import record as record_port
-from firmware_bridge.frames.commands import ArrayName, Command, FrameType, parse_message
-from firmware_bridge.frames.decoder import encode_message
 from firmware_bridge.host.mounting.on_board import candidate_arrays, mounting_words
 from gfimu import AccelerometerArray, BoardSettings, InputError, RecordCallbacks, RecordingWarning, record
 from gfimu.recording import Recording

@@ -39,8 +39,8 @@ def test_a_chip_without_readings_and_a_unit_that_moves() -> None:
 
 def test_over_a_port_with_a_chip_that_is_silent() -> None:
     pytest.importorskip("unicorn", reason="the emulator is in the extra 'firmware'")
-    from firmware_bridge import BoardProcess
-    from firmware_bridge.adxl345.registers import DATA_FORMAT, SELF_TEST, LineFault
+    from firmware_bridge import BoardProcess, LineFault
+    from firmware_bridge.adxl345.registers import DATA_FORMAT, SELF_TEST
 
     port, done = open_port("tcp:0"), threading.Event()
     with BoardProcess() as board:

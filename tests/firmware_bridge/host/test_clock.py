@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from firmware_bridge.frames.decoder import Samples, Status
-from firmware_bridge.host.clock import ClockFit, HostClock, SampleRate
+from firmware_bridge import ClockFit, HostClock, SampleRate, Samples, Status
 
 
 def arrivals(seed: int, *, seconds: int = 120, rate_error: float = 40e-6, offset: float = 1000.0):

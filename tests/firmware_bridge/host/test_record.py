@@ -14,10 +14,18 @@ from contextlib import contextmanager, suppress
 import numpy as np
 import pytest
 
-from firmware_bridge import encode_samples, open_port, record, serve
-from firmware_bridge.frames.commands import Command, encode_command, set_range, set_rate
-from firmware_bridge.host.link import Link
-from firmware_bridge.host.recorder import SampleClock
+from firmware_bridge import (
+    Command,
+    Link,
+    SampleClock,
+    encode_command,
+    encode_samples,
+    open_port,
+    record,
+    serve,
+    set_range,
+    set_rate,
+)
 from gfimu import AccelerometerArray, GfimuError, InputError
 from gfimu.recording import Recording
 

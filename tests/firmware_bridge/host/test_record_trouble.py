@@ -13,12 +13,8 @@ import time
 import numpy as np
 import pytest
 
-from firmware_bridge import Journal, encode_samples, record
+from firmware_bridge import ClockFit, Journal, JournalError, Link, PseudoTerminal, encode_samples, record
 from firmware_bridge.host import journal
-from firmware_bridge.host.clock import ClockFit
-from firmware_bridge.host.journal import JournalError
-from firmware_bridge.host.link import Link
-from firmware_bridge.loop.virtual_port import PseudoTerminal
 from gfimu import GfimuError, InputError
 from gfimu.recording import Recording
 

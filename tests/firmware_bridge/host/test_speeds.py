@@ -9,12 +9,19 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 
-from firmware_bridge import as_received, open_port, record, serve
-from firmware_bridge.frames.commands import Command, encode_command, set_rate
-from firmware_bridge.frames.decoder import frame_format
-from firmware_bridge.host.finder import find_boards
-from firmware_bridge.host.line_up import change_speed
-from firmware_bridge.host.link import Link
+from firmware_bridge import (
+    Command,
+    Link,
+    as_received,
+    change_speed,
+    encode_command,
+    find_boards,
+    frame_format,
+    open_port,
+    record,
+    serve,
+    set_rate,
+)
 from gfimu import InputError
 from gfimu.recording import Recording
 

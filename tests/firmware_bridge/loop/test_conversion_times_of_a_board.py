@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 
 pytest.importorskip("unicorn", reason="the emulator is in the extra 'firmware'")
 
-from firmware_bridge import Adxl345Options, record_virtual
-from firmware_bridge.frames.commands import RATE_CODE_AUTO, Identity
+from firmware_bridge import RATE_CODE_AUTO, Adxl345Options, Identity, record_virtual
 from gfimu import AccelerometerArray
 from gfimu.base import STANDARD_GRAVITY
 from gfimu.recording import conversion_times
-from sim.chips.adxl345 import SensorErrors
+from sim import SensorErrors
 
 LARGEST = 15.9 * STANDARD_GRAVITY
 CHIPS = [Adxl345Options(clock_error=error, phase=0.3) for error in (4e-3, -6e-3, 2e-3, -5e-4)]

@@ -96,7 +96,7 @@ def test_the_caller_never_loads_the_emulator() -> None:
 
 @needs_board
 def test_a_fault_of_the_firmware_crosses_the_process(tmp_path) -> None:
-    from firmware_bridge.board.faults import BoardFault, FaultKind
+    from firmware_bridge import BoardFault, FaultKind
 
     image = tmp_path / "lost.bin"
     image.write_bytes((0x10008000).to_bytes(4, "little") + (0x90000001).to_bytes(4, "little"))

@@ -14,17 +14,18 @@ from firmware_bridge import (
     TICKS_PER_SECOND,
     Adxl345Options,
     BoardProcess,
+    RidePhysics,
     SampleDecoder,
+    Status,
     format_count,
     open_port,
     record,
     record_virtual,
+    sample_at,
     serve,
+    set_rate,
+    typical_chips,
 )
-from firmware_bridge.frames.commands import sample_at, set_rate
-from firmware_bridge.frames.decoder import Status
-from firmware_bridge.loop.physics import RidePhysics
-from firmware_bridge.loop.virtual_run import typical_chips
 from gfimu import AccelerometerArray, InputError
 from gfimu.motion.estimation import estimate
 from gfimu.recording import Recording

@@ -9,21 +9,27 @@ pytest.importorskip("unicorn", reason="the emulator is in the extra 'firmware'")
 
 from unicorn.arm_const import UC_ARM_REG_PRIMASK
 
-from firmware_bridge import RAW_PER_COUNT, Adxl345, Adxl345Options, Board, FastBoard, SampleDecoder, image_path
-from firmware_bridge.board.nvic import FIRST_IRQ
-from firmware_bridge.frames.commands import (
+from firmware_bridge import (
     FAST_BAUD,
+    FIRST_IRQ,
+    RAW_PER_COUNT,
+    Adxl345,
+    Adxl345Options,
+    Board,
     Command,
+    ElfImage,
+    FastBoard,
     Reply,
     Result,
+    SampleDecoder,
+    Status,
+    StrictBoard,
     encode_command,
+    image_path,
     parse_message,
     set_range,
     set_rate,
 )
-from firmware_bridge.frames.decoder import Status
-from firmware_bridge.lpc1768.elf import ElfImage
-from firmware_bridge.strict.board import StrictBoard
 
 TIMES = 300
 PERIODS = 5  # of sampling after a command; chips that are slower than the sampling may take 16 to be ready together

@@ -9,10 +9,9 @@ import tomllib
 
 import pytest
 
-from firmware_bridge import build, image_path
+from firmware_bridge import ElfImage, build, image_path
 from firmware_bridge.lpc1768 import build as firmware
 from firmware_bridge.lpc1768.build import IMAGES, check_image, compiler_version, named_image, source_hash
-from firmware_bridge.lpc1768.elf import ElfImage
 from gfimu import GfimuError, InputError
 
 

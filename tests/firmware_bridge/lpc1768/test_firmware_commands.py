@@ -9,21 +9,22 @@ import pytest
 
 pytest.importorskip("unicorn", reason="the emulator is in the extra 'firmware'")
 
-from firmware_bridge import SampleDecoder
-from firmware_bridge.frames.checksum import crc16
-from firmware_bridge.frames.commands import (
+from firmware_bridge import (
     FAST_BAUD,
     RATES_HZ,
     Command,
     Identity,
     Reply,
     Result,
+    SampleDecoder,
+    Samples,
+    Status,
+    crc16,
     encode_command,
     parse_message,
     set_range,
     set_rate,
 )
-from firmware_bridge.frames.decoder import Samples, Status
 from gfimu import InputError
 
 KINDS = ("python", "fast")

@@ -9,22 +9,27 @@ import pytest
 
 pytest.importorskip("ziglang", reason="the C compiler is in the extra 'firmware'")
 
-from firmware_bridge import RAW_PER_COUNT, TICKS_PER_SECOND, Adxl345, Adxl345Options, SampleDecoder
-from firmware_bridge.adxl345.registers import LineFault
-from firmware_bridge.frames.checksum import crc16
-from firmware_bridge.frames.commands import (
+from firmware_bridge import (
+    RAW_PER_COUNT,
+    TICKS_PER_SECOND,
+    Adxl345,
+    Adxl345Options,
     ArrayName,
     Command,
     Identity,
+    LineFault,
     Reply,
     Result,
+    SampleDecoder,
+    Samples,
+    Status,
+    build_host_library,
+    crc16,
     encode_command,
     parse_message,
     set_range,
     set_rate,
 )
-from firmware_bridge.frames.decoder import Samples, Status
-from firmware_bridge.lpc1768.build import build_host_library
 
 US = TICKS_PER_SECOND // 1_000_000
 EXCHANGE = ctypes.CFUNCTYPE(None, ctypes.c_uint32, ctypes.POINTER(ctypes.c_uint16), ctypes.c_uint32)

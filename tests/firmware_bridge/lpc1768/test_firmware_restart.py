@@ -9,13 +9,21 @@ import pytest
 
 pytest.importorskip("unicorn", reason="the emulator is in the extra 'firmware'")
 
-from firmware_bridge import TICKS_PER_SECOND, BoardProcess, SampleDecoder, record_virtual
-from firmware_bridge.board.nvic import FIRST_IRQ
-from firmware_bridge.board.ssp import Ssp
-from firmware_bridge.frames.commands import Command, Identity, encode_command, parse_message
-from firmware_bridge.frames.decoder import Status
+from firmware_bridge import (
+    FIRST_IRQ,
+    TICKS_PER_SECOND,
+    BoardProcess,
+    Command,
+    ElfImage,
+    Identity,
+    SampleDecoder,
+    Ssp,
+    Status,
+    encode_command,
+    parse_message,
+    record_virtual,
+)
 from firmware_bridge.lpc1768 import build as firmware
-from firmware_bridge.lpc1768.elf import ElfImage
 from sim.ride import Ride
 
 KINDS = ("python", "fast")

@@ -6,9 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from firmware_bridge import write_project
-from firmware_bridge.lpc1768.build import SOURCES
-from firmware_bridge.lpc1768.elf import ElfImage
+from firmware_bridge import SOURCES, ElfImage, write_project
 from firmware_bridge.sender.project import readme
 from gfimu import InputError
 from tests.firmware_bridge.sender.conftest import BARE, CORE, STRICT

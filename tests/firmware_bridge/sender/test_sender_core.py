@@ -9,11 +9,20 @@ import pytest
 
 pytest.importorskip("ziglang", reason="the C compiler is in the extra 'firmware'")
 
-from firmware_bridge import TICKS_PER_SECOND, Adxl345, Adxl345Options, SampleDecoder
-from firmware_bridge.adxl345.registers import LineFault
-from firmware_bridge.frames.commands import Command, encode_command, set_range, set_rate
-from firmware_bridge.frames.decoder import Samples, Status
-from firmware_bridge.lpc1768.build import build_host_library
+from firmware_bridge import (
+    TICKS_PER_SECOND,
+    Adxl345,
+    Adxl345Options,
+    Command,
+    LineFault,
+    SampleDecoder,
+    Samples,
+    Status,
+    build_host_library,
+    encode_command,
+    set_range,
+    set_rate,
+)
 from tests.firmware_bridge.conftest import moving_source
 
 US = TICKS_PER_SECOND // 1_000_000

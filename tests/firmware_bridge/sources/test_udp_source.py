@@ -9,10 +9,7 @@ import time
 import numpy as np
 import pytest
 
-from firmware_bridge import encode_samples, record
-from firmware_bridge.frames.decoder import frame_format
-from firmware_bridge.host.finder import find_boards
-from firmware_bridge.sources.udp import UdpSource
+from firmware_bridge import UdpSource, encode_samples, find_boards, frame_format, record
 from gfimu import InputError
 from gfimu.recording import Recording
 

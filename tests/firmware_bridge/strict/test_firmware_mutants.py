@@ -13,10 +13,8 @@ import pytest
 pytest.importorskip("unicorn", reason="the emulator is in the extra 'firmware'")
 pytest.importorskip("ziglang", reason="the C compiler is in the extra 'firmware'")
 
-from firmware_bridge import Adxl345
+from firmware_bridge import Adxl345, ElfImage, StrictBoard
 from firmware_bridge.lpc1768 import build as firmware
-from firmware_bridge.lpc1768.elf import ElfImage
-from firmware_bridge.strict.board import StrictBoard
 from firmware_bridge.strict.watch import Policy
 from firmware_bridge.strict.worker import run_with_commands, run_with_input
 

@@ -11,10 +11,9 @@ import pytest
 
 pytest.importorskip("unicorn", reason="the emulator is in the extra 'firmware'")
 
-from firmware_bridge import Adxl345, image_path
-from firmware_bridge.frames.commands import Command, encode_command, set_range, set_rate
-from firmware_bridge.lpc1768.elf import ElfImage, Segment
-from firmware_bridge.strict.board import STUCK, StrictBoard
+from firmware_bridge import Adxl345, Command, ElfImage, StrictBoard, encode_command, image_path, set_range, set_rate
+from firmware_bridge.lpc1768.elf import Segment
+from firmware_bridge.strict.board import STUCK
 from firmware_bridge.strict.check import CheckOptions, check_image
 from firmware_bridge.strict.image import load_image
 from firmware_bridge.strict.rules import RULES

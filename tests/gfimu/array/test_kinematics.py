@@ -19,8 +19,14 @@ from gfimu import (
     pseudo_inverse,
     specific_force,
 )
-from gfimu.array import omega_products, seeing_arrays
-from gfimu.array.kinematics import joint_covariance, omega_leakage, require_all_motions, unseen_motions
+from gfimu.array import (
+    joint_covariance,
+    omega_leakage,
+    omega_products,
+    require_all_motions,
+    seeing_arrays,
+    unseen_motions,
+)
 
 SHIPPED = seeing_arrays()
 CUBES = ("cube12", "cube12_as_built")

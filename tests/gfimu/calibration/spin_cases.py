@@ -6,14 +6,11 @@ import numpy as np
 
 from gfimu import AccelerometerArray, specific_force
 from gfimu.base import STANDARD_GRAVITY
-from gfimu.calibration.methods import calibrate
-from gfimu.calibration.spin import SpinPolicy, spin
-from gfimu.recording import Recording
-from gfimu.recording.carried_array import array_metadata
-from sim import PoseSequence
-from sim.chips.adxl345 import Sensor, SensorSettings
+from gfimu.calibration import SpinPolicy, calibrate
+from gfimu.calibration.spin import spin
+from gfimu.recording import Recording, array_metadata
+from sim import PoseSequence, Sensor, SensorSettings, speed_sweep, spin_profile
 from sim.forward import leaning, rigid_readings, table_geometry
-from sim.motions.profiles import speed_sweep, spin_profile
 from sim.world import Lean, World
 
 RATE = 100.0

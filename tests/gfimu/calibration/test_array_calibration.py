@@ -10,13 +10,12 @@ from scipy.spatial.transform import Rotation
 
 import gfimu.calibration.array_motion as array_motion_module
 from gfimu import AccelerometerArray, InputError, UnitError, calibrate_array, read_mimu4444, specific_force
-from gfimu.calibration import ErrorModel
+from gfimu.calibration import ErrorModel, averaged_poses
 from gfimu.calibration.array_motion import array_motion
 from gfimu.calibration.array_static import apparent_alpha, array_static, body_specific_force, disagreement
 from gfimu.calibration.array_update import array_update
 from gfimu.calibration.faults import without_moved_poses
 from gfimu.calibration.motion_reference import motion_reference
-from gfimu.calibration.observations import averaged_poses
 from gfimu.recording import Recording, detect_rest
 
 

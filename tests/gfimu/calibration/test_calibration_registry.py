@@ -10,9 +10,9 @@ from every_item import every
 from recordings import pose_recording
 
 from gfimu import InputError
-from gfimu.calibration import METHODS
+from gfimu.calibration import METHODS, calibrate
 from gfimu.calibration.error_model import GAUGES
-from gfimu.calibration.methods import CalibrationTask, calibrate, run_calibration
+from gfimu.calibration.methods import CalibrationTask, run_calibration
 from gfimu.calibration.registry import CalibrationMethod, calibration_method
 
 

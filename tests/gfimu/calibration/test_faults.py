@@ -8,9 +8,9 @@ from calibration_cases import FACES, GRAVITY, MULTI
 from recordings import pose_recording
 
 from gfimu import InputError
-from gfimu.calibration import METHODS
-from gfimu.calibration.methods import calibrate, calibrate_gyro
-from gfimu.calibration.observations import averaged_poses, denoised_samples, every_sample, observations_from
+from gfimu.calibration import METHODS, averaged_poses, calibrate, every_sample
+from gfimu.calibration.methods import calibrate_gyro
+from gfimu.calibration.observations import denoised_samples, observations_from
 from gfimu.recording import Recording, detect_rest
 
 TRIAD_METHODS = [name for name, method in METHODS.items() if method.gauges]

@@ -5,8 +5,8 @@ import pytest
 from calibration_cases import FACES, GRAVITY, MULTI, TWELVE, assert_honest, simulate
 
 from gfimu.array import EARTH_RATE
-from gfimu.calibration import ErrorModel, Observations
-from gfimu.calibration.multi_position import multi_position, multi_position_gyro
+from gfimu.calibration import ErrorModel, Observations, multi_position_gyro
+from gfimu.calibration.multi_position import multi_position
 from gfimu.calibration.recursive import recursive
 from gfimu.calibration.six_position import six_position
 from gfimu.calibration.twelve_position import twelve_position

@@ -15,7 +15,7 @@ from gfimu.calibration.fit_quality import covariance_scale, mean_factor
 from gfimu.calibration.multi_position import magnitude_condition, multi_position
 from gfimu.calibration.nonlinearity import quadratic_std, with_quadratic, without_quadratic
 from gfimu.recording import Recording
-from sim.chips.adxl345 import SensorSettings
+from sim import SensorSettings
 
 
 @pytest.fixture(scope="module")

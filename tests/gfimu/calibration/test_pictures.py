@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from gfimu import AccelerometerArray, Calibration, Chip, Recording
-from gfimu.base import chip_colour
-from gfimu.base.results.colours import css
+from gfimu.base import chip_colour, css
 from gfimu.calibration.parameter_names import parameter_names
 from gfimu.calibration.pictures import calibration_figure, pose_names
 

@@ -8,13 +8,13 @@ import spin_cases
 from spin_cases import CUBE, ON_ITS_SIDE, Unit, normalised_errors
 
 from gfimu import Calibration, InputError, UnitError, load_calibration
-from gfimu.calibration import ErrorModel, certify
+from gfimu.calibration import ErrorModel, SpinPolicy, certify
 from gfimu.calibration.nonlinearity import cubic_std
-from gfimu.calibration.spin import SpinPolicy, spin
+from gfimu.calibration.spin import spin
 from gfimu.calibration.spin.model import Geometry, SpinGeometry, read_plateaus
 from gfimu.calibration.spin.plateaus import find_plateaus
 from gfimu.recording import Recording
-from sim.chips.adxl345 import SensorErrors, SensorSettings
+from sim import SensorErrors, SensorSettings
 from sim.scenarios import Scenario
 from sim.simulation import simulate
 

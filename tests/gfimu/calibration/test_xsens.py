@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 
 from gfimu import InputError
-from gfimu.calibration.imu_tk import read_text_triad
-from gfimu.calibration.methods import calibrate
+from gfimu.calibration import averaged_poses, calibrate, every_sample, read_text_triad
 from gfimu.calibration.multi_position import multi_position
-from gfimu.calibration.observations import averaged_poses, every_sample
 from gfimu.recording import detect_rest
 
 GRAVITY = 9.81744

@@ -8,12 +8,9 @@ import pytest
 
 import gfimu
 from gfimu import InputError
-from sim.rigs.driven import drive
+from sim import drive
 from sim.scenarios import Scenario
-from sim.trials import load_plan
-from sim.trials.campaign.drive import DriveWork
-from sim.trials.sweep.design import Case
-from sim.trials.sweep.engine import run_batch
+from sim.trials import Case, DriveWork, load_plan, run_batch
 
 PLAN = """
 kind = "drive"

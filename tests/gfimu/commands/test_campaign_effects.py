@@ -5,9 +5,9 @@ import pytest
 
 from gfimu import AccelerometerArray, InputError
 from sim.scenarios import Scenario
+from sim.trials import Case
 from sim.trials.campaign.cases import estimate_case
 from sim.trials.campaign.effects import drawn_effects, names_effect
-from sim.trials.sweep.design import Case
 
 CUBE = AccelerometerArray.load("cube12")
 SETTING = {"scenario": "paper_run", "duration_s": 6, "calibration": "rest", "method": "integrate"}

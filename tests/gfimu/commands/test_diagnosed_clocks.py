@@ -12,7 +12,7 @@ import gfimu
 from gfimu import Diagnosis, NamedCause
 from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.verdict.parts import NoiseLevels, Residual, Unexplained
-from gfimu.recording.joining import ReferenceSeries
+from gfimu.recording import ReferenceSeries
 from sim.trials import Measurement, measure
 from sim.twin import Twin
 

@@ -6,7 +6,8 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from gfimu import AccelerometerArray, Chip
-from gfimu.diagnosis import BodyStretch, make_body_stretches, prepare_body_run
+from gfimu.diagnosis.data.body.run import prepare_body_run
+from gfimu.diagnosis.data.body.stretch import BodyStretch, make_body_stretches
 from gfimu.motion import BodyDrive
 from gfimu.recording import Recording
 from sim.effects import make_effect

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from gfimu import AccelerometerArray
-from gfimu.diagnosis import Policy, diagnose, make_stretches, prepare, understand
+from gfimu.diagnosis import Policy, diagnose, make_stretches, prepare
 from gfimu.diagnosis.criticism import holdout
+from gfimu.diagnosis.search.nuisance_models import understand
 from sim.effects import EFFECTS, make_effect
-from sim.trials import Case, Measurement, draw_world, measure
-from sim.trials.study.cases import study_cases
+from sim.trials import Measurement, draw_world, measure, study_cases
+from sim.trials.study.cases import Case
 from sim.twin import Twin
 
 TWIN = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")

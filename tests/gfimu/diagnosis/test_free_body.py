@@ -8,8 +8,12 @@ import pytest
 from rerun.chunk import RrdReader
 
 from gfimu import InputError
-from gfimu.base import find_model, read_toml
-from gfimu.diagnosis import HandDrive, diagnose, make_body_stretches, prepare, prepare_body_run, write_picture
+from gfimu.base import find_model
+from gfimu.base.files.model_files import read_toml
+from gfimu.diagnosis import diagnose, prepare, write_picture
+from gfimu.diagnosis.data.body.run import prepare_body_run
+from gfimu.diagnosis.data.body.stretch import make_body_stretches
+from gfimu.diagnosis.terms.hand.drive import HandDrive
 from gfimu.motion import BodyDrive, to_rotation
 from sim.effects import BODY_EFFECTS, EFFECTS, NOT_OF_A_BODY
 from sim.scenarios import Scenario

@@ -15,8 +15,7 @@ from gfimu.diagnosis.verdict.naming import capped
 from gfimu.diagnosis.verdict.wording import verdict_sentences
 from gfimu.recording import Recording
 from sim.effects import make_effect
-from sim.trials import Measurement, draw_world, measure, random_profile
-from sim.trials.study.cases import study_cases
+from sim.trials import Measurement, draw_world, measure, random_profile, study_cases
 
 SETTING = Measurement(duration=24.0)
 

@@ -22,8 +22,8 @@ from gfimu.diagnosis import (
 from gfimu.diagnosis.criticism.holdout import split
 from gfimu.diagnosis.fit.gauss_newton import fit
 from gfimu.recording import Recording
+from sim import Hold, Ramp, spin_profile
 from sim.effects import make_effect
-from sim.motions.profiles import Hold, Ramp, spin_profile
 from sim.trials import Measurement, hidden_effect, measure, random_profile
 from sim.twin import Twin
 

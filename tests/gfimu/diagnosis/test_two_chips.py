@@ -13,8 +13,11 @@ from scipy.ndimage import gaussian_filter1d
 
 from gfimu import AccelerometerArray, Chip, InputError, NamedCause
 from gfimu.base import STANDARD_GRAVITY
-from gfimu.diagnosis import HandDrive, diagnose, make_body_stretches, prepare_body_run
+from gfimu.diagnosis import diagnose
 from gfimu.diagnosis.criticism.gain import Gain
+from gfimu.diagnosis.data.body.run import prepare_body_run
+from gfimu.diagnosis.data.body.stretch import make_body_stretches
+from gfimu.diagnosis.terms.hand.drive import HandDrive
 from gfimu.diagnosis.terms.hand.learning import first_noise
 from gfimu.diagnosis.terms.hand.noise import Projection
 from gfimu.diagnosis.terms.hand.posterior import condition_hand

@@ -4,8 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from gfimu.diagnosis import Policy, diagnose, make_stretches, prepare, understand
-from sim.trials import Case, draw_world
+from gfimu.diagnosis import Policy, diagnose, make_stretches, prepare
+from gfimu.diagnosis.search.nuisance_models import understand
+from sim.trials import draw_world
+from sim.trials.study.cases import Case
 
 
 @pytest.mark.study

@@ -8,8 +8,7 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from gfimu import InputError, integrate_attitude
-from gfimu.motion import from_rotation, to_rotation
-from gfimu.motion.attitude import ATTITUDE_METHODS, table_angle, twist_angle
+from gfimu.motion import ATTITUDE_METHODS, from_rotation, table_angle, to_rotation, twist_angle
 
 vectors = st.lists(st.floats(-20, 20), min_size=3, max_size=3).map(np.array)
 

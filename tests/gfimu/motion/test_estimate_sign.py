@@ -10,7 +10,7 @@ import pytest
 from gfimu import AccelerometerArray, Estimate, Recording, specific_force, summarise
 from gfimu.array import PartLimits
 from gfimu.motion.estimation import estimate
-from gfimu.visual.run_plots import free_rate_plots
+from gfimu.visual import free_rate_plots
 
 CUBE = AccelerometerArray.load("cube12")
 

@@ -10,8 +10,7 @@ import pytest
 from gfimu import AccelerometerArray
 from gfimu.diagnosis import Policy, make_stretches, prepare_run, starting_point
 from gfimu.diagnosis.data.stretch import moved
-from gfimu.recording import Recording, reference_on_rows, reference_series
-from gfimu.recording.joining import ReferenceSeries, join_reference
+from gfimu.recording import Recording, ReferenceSeries, join_reference, reference_on_rows, reference_series
 from sim.twin import Twin
 
 TWIN = Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")

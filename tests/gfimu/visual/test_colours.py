@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from every_item import every
 
-from gfimu.base import chip_colour
-from gfimu.base.results.colours import AFTER, AFTER_ON_PAPER, BEFORE, BEFORE_ON_PAPER, SEPARATED, css
+from gfimu.base import chip_colour, css
+from gfimu.base.results.colours import AFTER, AFTER_ON_PAPER, BEFORE, BEFORE_ON_PAPER, SEPARATED
 
 VISION = {
     "normal": np.eye(3),

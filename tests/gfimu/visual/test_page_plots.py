@@ -12,7 +12,8 @@ import pytest
 
 from gfimu.base import PAGE, chip_colour
 from gfimu.base.results.colours import TONES
-from gfimu.visual.page import Packed, enveloped, page_plots
+from gfimu.visual import Packed, page_plots
+from gfimu.visual.page import enveloped
 
 
 def unpacked(data: Packed) -> list[np.ndarray]:

@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gfimu import AccelerometerArray, InputError
-from sim import DataSheet, quantise
-from sim.chips.adxl345 import Sensor, SensorErrors, SensorSettings, conversion_offsets, draw_errors, flicker
+from sim import DataSheet, Sensor, SensorErrors, SensorSettings, quantise
+from sim.chips.adxl345 import conversion_offsets, draw_errors, flicker
 
 MG = 9.80665e-3
 LSB = 3.9 * MG

@@ -7,8 +7,7 @@ import pytest
 
 from gfimu import AccelerometerArray, InputError
 from gfimu.array import white_noise_std
-from sim.chips.adxl345 import Sensor, SensorSettings
-from sim.chips.conversions import conversion_groups
+from sim import Sensor, SensorSettings, conversion_groups
 from sim.ride import Ride
 from sim.scenarios import Scenario
 from sim.simulation import simulate

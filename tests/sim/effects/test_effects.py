@@ -15,11 +15,9 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import lsim, lti
 
 from gfimu import AccelerometerArray, InputError
-from sim import SpinState, SplineSpin, forward, prescribed_readings
+from sim import Chirp, Hold, Ramp, SpinState, SplineSpin, forward, prescribed_readings, spin_profile, turntable_model
 from sim.effects import EFFECTS, Effect, apply_effects, make_effect
 from sim.effects.low_pass import low_pass, mass_on_spring
-from sim.motions.profiles import Chirp, Hold, Ramp, spin_profile
-from sim.rigs.rig_model import turntable_model
 from sim.trials import random_profile
 from sim.trials.benchmark.generators.independent_effects import DRAWS, SIZELESS, rig_with
 from sim.trials.benchmark.generators.independent_table import Rig, TableRun, drive_table

@@ -7,8 +7,8 @@ from scipy.spatial.transform import Rotation
 import gfimu
 from gfimu import InputError
 from gfimu.rate.axis.axis_gyro import with_axis_gyro
+from sim import Hold, Ramp, spin_profile
 from sim.motions.carried import Hand, Wheel
-from sim.motions.profiles import Hold, Ramp, spin_profile
 from sim.scenarios import Scenario
 
 SPIN = spin_profile([Hold(1.0), Ramp(6.0, 2.0), Hold(3.0), Ramp(-3.0, 2.0), Hold(2.0)], start_angle=0.4)

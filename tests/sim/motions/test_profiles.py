@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gfimu import InputError
-from sim.motions.profiles import Chirp, Hold, Ramp, Sine, Tumble, paper_run, speed_sweep, spin_profile
+from sim import Chirp, Hold, Ramp, Sine, Tumble, paper_run, speed_sweep, spin_profile
 
 
 def test_profile_goes_through_its_holds():

@@ -7,10 +7,8 @@ from scipy.spatial.transform import Rotation
 import gfimu
 from gfimu import InputError
 from gfimu.recording import Recording
-from sim import forward, prescribed_readings
+from sim import Carriage, Chirp, Hold, Ramp, forward, prescribed_readings, spin_profile
 from sim.effects import CARRIAGE_EFFECTS, NOT_OF_A_CARRIAGE, TABLE_EFFECTS, make_effect
-from sim.motions.carried import Carriage
-from sim.motions.profiles import Chirp, Hold, Ramp, spin_profile
 from sim.scenarios import Scenario
 from sim.twin import Twin
 

@@ -9,10 +9,7 @@ from scipy.integrate import quad
 
 from gfimu import AccelerometerArray, InputError
 from gfimu.base import find_model
-from sim import SpinState, forward
-from sim.motions.profiles import Hold, Ramp, spin_profile
-from sim.rigs.dc_motor import DcMotor
-from sim.rigs.driven import Drive, drive
+from sim import DcMotor, Drive, Hold, Ramp, SpinState, drive, forward, spin_profile
 from sim.scenarios import Scenario
 from sim.world import World
 

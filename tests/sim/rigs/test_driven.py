@@ -8,10 +8,7 @@ import pytest
 from mujoco.batch import Batch, SimulationError
 
 from gfimu import AccelerometerArray, InputError
-from sim.motions.profiles import Hold, Ramp, spin_profile
-from sim.rigs.dc_motor import DcMotor
-from sim.rigs.driven import Drive, drive, drive_all
-from sim.rigs.rig_model import channel_places
+from sim import DcMotor, Drive, Hold, Ramp, channel_places, drive, drive_all, spin_profile
 from sim.world import World
 
 COLUMNS = ("t", "readings", "tacho", "torque")

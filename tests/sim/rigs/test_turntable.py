@@ -8,11 +8,20 @@ from scipy.spatial.transform import Rotation
 
 from gfimu import AccelerometerArray, Chip, InputError, specific_force
 from gfimu.base import STANDARD_GRAVITY
-from sim import SpinState, forward, prescribed_readings
+from sim import (
+    Chirp,
+    Hold,
+    Ramp,
+    SpinState,
+    Tumble,
+    drive,
+    forward,
+    free_model,
+    prescribed_readings,
+    spin_profile,
+    turntable_model,
+)
 from sim.effects import make_effect
-from sim.motions.profiles import Chirp, Hold, Ramp, Tumble, spin_profile
-from sim.rigs.driven import drive
-from sim.rigs.rig_model import free_model, turntable_model
 from sim.truth import cube_state
 from sim.world import Nod, World
 

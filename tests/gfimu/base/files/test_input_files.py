@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 
 from gfimu import InputError
-from gfimu.base import MemoryLimit
-from gfimu.base.files.input_file import check_input, is_ordinary, parsing, read_bytes, unpacked
+from gfimu.base import MemoryLimit, read_bytes
+from gfimu.base.files.input_file import check_input, is_ordinary, parsing, unpacked
 from gfimu.base.files.model_files import parse_toml
 
 

@@ -8,7 +8,8 @@ import pytest
 from every_item import every
 
 from gfimu import InputError
-from gfimu.base import find_model, list_models, read_toml
+from gfimu.base import find_model, list_models
+from gfimu.base.files.model_files import read_toml
 from gfimu.base.files.schema_keys import json_schema, table_rows
 from gfimu.commands.file_kinds import FILE_KINDS, check_file, file_schema
 

@@ -31,7 +31,7 @@ from gfimu.base.lazy_names import homes_of
 from gfimu.base.results import PlottedResult, TableResult
 from gfimu.commands.benchmark_results import BenchmarkRun
 from gfimu.commands.demo_steps import Row
-from gfimu.recording.joining import ReferenceSeries, join_reference
+from gfimu.recording import ReferenceSeries, join_reference
 from sim.trials.benchmark.judged import Judged
 from sim.trials.benchmark.table import Judgement
 from sim.trials.sweep.pace import Run

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gfimu import AccelerometerArray, ErrorSources, InputError, drift_budget, equivalent_rate_drift, monte_carlo_drift
-from gfimu.budget.drift.budget import TILT_LIMIT, motion_covariance
-from gfimu.budget.drift.closed_forms import position_error
+from gfimu.budget import motion_covariance, position_error
+from gfimu.budget.drift.budget import TILT_LIMIT
 
 G = 9.80665
 MG = G / 1000

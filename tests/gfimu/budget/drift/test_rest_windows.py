@@ -6,10 +6,8 @@ from numpy.testing import assert_allclose
 
 import gfimu
 from gfimu import AccelerometerArray, ErrorSources, InputError, Recording, drift_budget, specific_force
-from gfimu.budget.drift.budget import motion_covariance
-from gfimu.budget.drift.rest_windows import NoiseResponse, rest_drift
-from gfimu.sensor_noise import synthesise_noise
-from gfimu.sensor_noise.identification import TERMS
+from gfimu.budget import NoiseResponse, motion_covariance, rest_drift
+from gfimu.sensor_noise import TERMS, synthesise_noise
 
 CUBE = AccelerometerArray.load("cube12")
 G = 9.80665

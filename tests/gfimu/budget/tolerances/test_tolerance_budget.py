@@ -11,12 +11,12 @@ import scipy.stats
 from tolerance_cases import ONLY, motion_of, only, poses, run_of
 
 from gfimu import AccelerometerArray, ChipErrors, InputError, tolerance
+from gfimu.budget import pay_for, room_for
 from gfimu.budget.tolerances.budget import tolerance_budget
 from gfimu.budget.tolerances.calibrated import CALIBRATIONS, calibrations_of, check_calibration
 from gfimu.budget.tolerances.comparison import compare
 from gfimu.budget.tolerances.propagation import error_maps
 from gfimu.budget.tolerances.tolerances import CAUSES, Tolerances
-from gfimu.budget.tolerances.words import pay_for, room_for
 from gfimu.commands.tolerance import _poses
 from gfimu.commands.tolerance_units import UnitTask, simulate_units, unit_rows
 from sim.trials.worlds.toleranced import known_motion_of, reference_motion

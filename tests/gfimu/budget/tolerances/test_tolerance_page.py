@@ -7,8 +7,7 @@ import re
 import pytest
 
 import gfimu
-from gfimu.budget.tolerances.budget import QUANTITIES
-from gfimu.budget.tolerances.words import pay_for, room_for
+from gfimu.budget import QUANTITIES, pay_for, room_for
 
 
 @pytest.fixture(scope="module")

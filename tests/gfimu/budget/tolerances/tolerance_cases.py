@@ -12,8 +12,7 @@ from gfimu.budget.tolerances.calibrated import Poses
 from gfimu.budget.tolerances.known_motion import KnownMotion
 from gfimu.budget.tolerances.tolerances import Tolerances
 from gfimu.motion.estimation import estimate
-from sim import PoseSequence
-from sim.chips.adxl345 import SensorErrors
+from sim import PoseSequence, SensorErrors
 from sim.scenarios import Scenario
 from sim.trials.worlds.toleranced import ToleranceUnit, known_motion_of, reference_motion
 

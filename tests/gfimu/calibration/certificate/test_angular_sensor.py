@@ -11,8 +11,7 @@ from gfimu.calibration.certificate.angular import angular_sensor_sheet
 from gfimu.calibration.certificate.angular.response import response
 from gfimu.calibration.certificate.certificate import Term
 from gfimu.calibration.parameter_names import parameter_names
-from gfimu.recording import Recording
-from gfimu.recording.carried_array import array_metadata
+from gfimu.recording import Recording, array_metadata
 from gfimu.sensor_noise import flicker_noise
 from sim import SpinState
 from sim.forward import rigid_readings

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from certification_cases import calibration_of, random_covariance, random_model
 
-from gfimu.base import OutputFolder
-from gfimu.calibration import certificate_html, certify
+from gfimu.base.files.outputs import OutputFolder
+from gfimu.calibration import certificate_html, certify, compare
 from gfimu.calibration.certificate.certificate import Component, Sheet, Term
-from gfimu.calibration.certificate.comparison import compare
 from gfimu.calibration.certificate.numbers import plus_minus
 from gfimu.calibration.certificate.page import write_certificate
 from gfimu.commands.certificate import FOLDER

@@ -8,8 +8,7 @@ from certification_cases import calibration_of, random_covariance, random_model,
 from scipy.stats import norm
 
 from gfimu import InputError, UnitError
-from gfimu.calibration import Observations, certify
-from gfimu.calibration.certificate.comparison import compare
+from gfimu.calibration import Observations, certify, compare
 from gfimu.calibration.multi_position import multi_position
 
 

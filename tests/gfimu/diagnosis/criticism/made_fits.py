@@ -9,9 +9,10 @@ from functools import cache
 import numpy as np
 
 from gfimu import AccelerometerArray
-from gfimu.diagnosis import Cause, Policy, learn_noise, learn_roughness, make_stretches, prepare, starting_point
+from gfimu.diagnosis import Cause, Policy, make_stretches, prepare, starting_point
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.gauss_newton import Fit, fit
+from gfimu.diagnosis.fit.learn import learn_noise, learn_roughness
 from gfimu.recording import Recording
 from sim.effects import Effect
 from sim.trials import Measurement, measure, random_profile

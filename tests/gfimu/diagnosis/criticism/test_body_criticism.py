@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from made_bodies import PERIOD, TWIN, hand_motion, hand_stretch
 
-from gfimu.diagnosis import HandDrive, Policy
+from gfimu.diagnosis import Policy
 from gfimu.diagnosis.criticism.body import body_functions, motion_noise, tone
+from gfimu.diagnosis.terms.hand.drive import HandDrive
 from gfimu.diagnosis.terms.hand.learning import first_noise
 from gfimu.diagnosis.terms.hand.posterior import condition_hand
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from made_bodies import TWIN, hand_motion, hand_stretch
 
-from gfimu.diagnosis import HandDrive
 from gfimu.diagnosis.criticism.views.body_view import body_noise_floor, body_view
+from gfimu.diagnosis.terms.hand.drive import HandDrive
 from gfimu.diagnosis.terms.hand.learning import first_noise
 from gfimu.diagnosis.terms.hand.noise import BodyNoise
 from gfimu.diagnosis.terms.hand.posterior import condition_hand

@@ -7,13 +7,14 @@ import pytest
 from numpy.testing import assert_allclose
 
 from gfimu import AccelerometerArray
-from gfimu.diagnosis import Cause, NoiseLevels, Policy, learn_roughness, make_stretches, prepare_run, starting_point
+from gfimu.diagnosis import Cause, NoiseLevels, Policy, make_stretches, prepare_run, starting_point
 from gfimu.diagnosis.criticism.holdout import gate_gains, held_out_gain, other_recordings, split
 from gfimu.diagnosis.fit.gauss_newton import fit
+from gfimu.diagnosis.fit.learn import learn_roughness
 from gfimu.diagnosis.fit.linear import with_residue
 from gfimu.recording import Recording
+from sim import Hold, Ramp, spin_profile
 from sim.effects import make_effect
-from sim.motions.profiles import Hold, Ramp, spin_profile
 from sim.trials import Measurement, measure, random_profile
 from sim.twin import Twin
 

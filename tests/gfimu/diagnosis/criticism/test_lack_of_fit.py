@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from made_fits import POLICY, cause, channel, fitted, quiet, recorded, twin
 
-from gfimu.diagnosis import lack_of_fit
 from gfimu.diagnosis.criticism.generic import judges_reference, series_products
-from gfimu.diagnosis.criticism.lack_of_fit import dependence_unexplained
+from gfimu.diagnosis.criticism.lack_of_fit import dependence_unexplained, lack_of_fit
 from gfimu.diagnosis.data.rounding import Steps
 from gfimu.diagnosis.fit.linear import linearise
 from sim.effects import make_effect

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from made_fits import POLICY, channel, fitted, quiet, recorded, twin
 
-from gfimu.diagnosis import walk_strength
 from gfimu.diagnosis.criticism.slow_noise import loudest_channel, white_factor
 from gfimu.diagnosis.fit.linear import energy_of, with_residue
 from gfimu.diagnosis.fit.observed_at import observed_at
+from gfimu.diagnosis.fit.random_walk import walk_strength
 from sim.effects import make_effect
 from sim.trials import bias_instability
 from sim.trials.study.outcome import calibration_residue

@@ -9,7 +9,8 @@ import pytest
 from made_fits import POLICY, channel, fitted, quiet, recorded, twin
 
 from gfimu.base import STANDARD_GRAVITY
-from gfimu.diagnosis import lack_of_fit, surrogates
+from gfimu.diagnosis.criticism.lack_of_fit import lack_of_fit
+from gfimu.diagnosis.criticism.surrogate import surrogates
 from gfimu.model import OF_READING
 
 

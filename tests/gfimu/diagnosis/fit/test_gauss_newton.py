@@ -10,8 +10,9 @@ import pytest
 from core_cases import cause_of, lively, small_twin, stretches_of
 from scipy.interpolate import CubicSpline
 
-from gfimu.diagnosis import NoiseLevels, Policy, learn_roughness, starting_point
+from gfimu.diagnosis import NoiseLevels, Policy, starting_point
 from gfimu.diagnosis.fit.gauss_newton import SETTLED, fit, linearly_without, log_prior
+from gfimu.diagnosis.fit.learn import learn_roughness
 from gfimu.diagnosis.fit.linear import energy_of
 
 TWIN = small_twin()

@@ -9,7 +9,9 @@ import pytest
 from core_cases import cause_of, lively, small_twin, stretches_of
 from numpy.testing import assert_allclose
 
-from gfimu.diagnosis import Policy, learn_noise, learn_roughness, starting_point, walk_strength
+from gfimu.diagnosis import Policy, starting_point
+from gfimu.diagnosis.fit.learn import learn_noise, learn_roughness
+from gfimu.diagnosis.fit.random_walk import walk_strength
 from sim.effects import make_effect
 
 TWIN = small_twin()

@@ -14,8 +14,8 @@ from made_runs import PERIOD, made_view
 from PIL import Image
 
 from gfimu import AccelerometerArray, Chip
-from gfimu.base import chip_colour
-from gfimu.base.results.colours import AFTER_ON_PAPER, BEFORE_ON_PAPER, css
+from gfimu.base import chip_colour, css
+from gfimu.base.results.colours import AFTER_ON_PAPER, BEFORE_ON_PAPER
 from gfimu.diagnosis import DrawnRig
 from gfimu.diagnosis.criticism.views.residuals import residual_views
 from gfimu.diagnosis.report import figures

@@ -11,7 +11,8 @@ from made_runs import PERIOD, made_view
 from gfimu import AccelerometerArray, Chip
 from gfimu.diagnosis.criticism.views.residuals import residual_views
 from gfimu.diagnosis.report import zooming
-from gfimu.visual.page import Packed, PlotLimits
+from gfimu.visual import Packed
+from gfimu.visual.page import PlotLimits
 
 ARRAY = AccelerometerArray(
     "four", (Chip("a1", np.zeros(3), np.eye(3)), Chip("a2", np.array([0.1, 0.0, 0.0]), np.eye(3)[:1]))

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from core_cases import small_twin, stretches_of
 
-from gfimu.diagnosis import Policy, starting_point, understand
+from gfimu.diagnosis import Policy, starting_point
 from gfimu.diagnosis.search import nuisance_models
+from gfimu.diagnosis.search.nuisance_models import understand
 from sim.effects import EFFECTS, make_effect
 
 

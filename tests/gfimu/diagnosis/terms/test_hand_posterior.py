@@ -9,19 +9,14 @@ import pytest
 from scipy.ndimage import gaussian_filter1d
 
 from gfimu import AccelerometerArray, Chip, TurningAxis
-from gfimu.diagnosis import (
-    Columns,
-    HandDrive,
-    Policy,
-    family_columns,
-    make_body_stretches,
-    prepare_body_run,
-    starting_point,
-)
+from gfimu.diagnosis import Columns, Policy, family_columns, starting_point
+from gfimu.diagnosis.data.body.run import prepare_body_run
+from gfimu.diagnosis.data.body.stretch import make_body_stretches
 from gfimu.diagnosis.fit.gauss_newton import determined, fit
 from gfimu.diagnosis.fit.linear import linearise, of_causes
 from gfimu.diagnosis.search.beam import Blocks, leading_sets
 from gfimu.diagnosis.search.screening import screen
+from gfimu.diagnosis.terms.hand.drive import HandDrive
 from gfimu.diagnosis.terms.hand.learning import first_noise
 from gfimu.diagnosis.terms.hand.posterior import condition_hand
 from gfimu.motion import BodyDrive

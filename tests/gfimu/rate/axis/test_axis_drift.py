@@ -8,7 +8,9 @@ from turning import NOISE, RATE, array_of, turned
 
 import gfimu
 from gfimu import GeometryError, InputError, TurningAxis
-from gfimu.rate import AxisChannels, AxisProblem, Settings, axis_drift
+from gfimu.rate.axis.accuracy.drift import axis_drift
+from gfimu.rate.axis.channels import AxisChannels
+from gfimu.rate.axis.problem import AxisProblem, Settings
 from gfimu.recording import Recording
 
 ONE = array_of((0.1, 0.0, 0.0))

@@ -12,7 +12,10 @@ from turning import NOISE, array_of, mounted
 from gfimu import AccelerometerArray, InputError, TurningAxis
 from gfimu.array import AxisUncertainty
 from gfimu.motion import estimate_about_axis
-from gfimu.rate import AxisChannels, AxisProblem, Mounting, Settings, fit_mounting
+from gfimu.rate.axis.channels import AxisChannels
+from gfimu.rate.axis.mounting import Mounting
+from gfimu.rate.axis.mounting_fit import fit_mounting
+from gfimu.rate.axis.problem import AxisProblem, Settings
 from gfimu.recording import Recording, mapped_recording
 
 ONE = array_of((0.1, 0.0, 0.02))

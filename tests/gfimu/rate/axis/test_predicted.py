@@ -9,11 +9,14 @@ from gfimu import InputError, TurningAxis
 from gfimu.array import AxisUncertainty
 from gfimu.commands.known_axis import KnownAxis
 from gfimu.motion import estimate_about_axis
-from gfimu.rate import AxisChannels, AxisProblem, Mounting, Settings, axis_bounds
+from gfimu.rate import axis_bounds
 from gfimu.rate.axis.accuracy.predicted import predicted_estimate
 from gfimu.rate.axis.accuracy.predicted_readings import readings_of, spun_up
 from gfimu.rate.axis.accuracy.predicted_run import PredictedRun
+from gfimu.rate.axis.channels import AxisChannels
 from gfimu.rate.axis.mirror import with_signs
+from gfimu.rate.axis.mounting import Mounting
+from gfimu.rate.axis.problem import AxisProblem, Settings
 from gfimu.rate.axis.roughness import with_roughness
 from gfimu.recording import Recording
 

@@ -5,11 +5,11 @@ import pytest
 from watched_world import CALIBRATED, CUBE, GRAVITY, RATE_HZ, readings
 
 from gfimu import InputError, SensorErrors
-from gfimu.rate import HealthCode, watch_from_rest
+from gfimu.rate import HealthCode
 from gfimu.rate.health import MonitorPolicy, watch_channels
 from gfimu.rate.health.recursion.monitor_filter import MonitorFilter
 from gfimu.rate.health.recursion.signatures import new_slot
-from gfimu.rate.health.watch import watch_in_motion
+from gfimu.rate.health.watch import watch_from_rest, watch_in_motion
 
 MG = 1e-3 * GRAVITY
 NAMES = list(CUBE.channels)

@@ -8,7 +8,9 @@ import pytest
 
 import gfimu
 from gfimu import InputError
-from gfimu.recording import RawTable, inspect_file, likely_references, reference_remedy
+from gfimu.recording import inspect_file
+from gfimu.recording.importing.guessing.likely_reference import likely_references, reference_remedy
+from gfimu.recording.importing.raw_table import RawTable
 
 RATE = np.linspace(-3.0, 3.0, 50)
 

@@ -2,7 +2,8 @@
 
 import pytest
 
-from gfimu.recording import RATES, RawTable, stated_rate
+from gfimu.recording.importing.guessing.times import RATES, stated_rate
+from gfimu.recording.importing.raw_table import RawTable
 
 
 def rate_of(line):

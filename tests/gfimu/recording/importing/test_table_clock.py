@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from gfimu import InputError
-from gfimu.recording import RawTable, increasing_times
+from gfimu.recording import increasing_times
 from gfimu.recording.importing.clock import parts_of, times_of
 from gfimu.recording.importing.column_map import TimeSpec
+from gfimu.recording.importing.raw_table import RawTable
 
 ROWS = 400
 

@@ -5,8 +5,7 @@ import pytest
 
 import gfimu
 from gfimu import AccelerometerArray, InputError
-from gfimu.recording import Recording
-from gfimu.recording.joining import ReferenceSeries, join_reference, open_reference
+from gfimu.recording import Recording, ReferenceSeries, join_reference, open_reference
 from gfimu.recording.joining.signals import functions_of
 from sim.trials import Measurement, measure
 from sim.twin import Twin

@@ -7,8 +7,9 @@ import json
 import pytest
 
 from gfimu import InputError
-from sim.trials import Case, draw_world
+from sim.trials import draw_world
 from sim.trials.study.__main__ import main
+from sim.trials.study.cases import Case
 from sim.trials.study.outcome_file import read_outcomes
 from sim.trials.study.report import reliability, summarise, write_report
 from sim.trials.study.tally import rate_with_interval, score

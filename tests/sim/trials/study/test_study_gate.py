@@ -12,16 +12,15 @@ import pytest
 
 from gfimu import InputError
 from sim.effects import EFFECTS
-from sim.trials import Case, draw_world
+from sim.trials import Dataset, draw_world, study_cases
 from sim.trials.study import __main__ as study
 from sim.trials.study import blame, plan
 from sim.trials.study.__main__ import main
 from sim.trials.study.blame import blame_of, is_miss
-from sim.trials.study.cases import EXOTICS, STUDIES, study_cases
+from sim.trials.study.cases import EXOTICS, STUDIES, Case
 from sim.trials.study.compare import load_outcomes
 from sim.trials.study.gate import LONGEST, STRATA, choose_gate, gate_cases
 from sim.trials.study.outcome_file import generator_name, read_outcomes
-from sim.trials.sweep.dataset import Dataset
 from sim.trials.sweep.engine import Workers
 from sim.trials.sweep.plan import PlanFile
 

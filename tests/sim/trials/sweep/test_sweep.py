@@ -11,8 +11,7 @@ import pytest
 from sweep_cases import always_dies, dies_once, quick
 
 from gfimu import InputError
-from sim.trials import Design, load_plan
-from sim.trials.sweep.dataset import Dataset
+from sim.trials import Dataset, Design, load_plan
 from sim.trials.sweep.engine import Workers, run_campaign
 from sim.trials.sweep.pool import open_pool
 from sim.trials.sweep.summary import failures, grouped

@@ -14,8 +14,8 @@ import pytest
 from sweep_cases import always_dies, counted, waits
 
 from gfimu import GfimuError, InputError, RecordingWarning
+from sim.trials import Dataset
 from sim.trials.sweep.cluster import open_cluster
-from sim.trials.sweep.dataset import Dataset
 from sim.trials.sweep.engine import run_campaign
 from sim.trials.sweep.executors import check_cluster, open_workers
 from sim.trials.sweep.pool import open_pool

@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 
-from sim.trials import Measurement, WorldFactory
-from sim.trials.campaign.worlds import measure_case
-from sim.trials.sweep.design import Case
+from sim.trials import Case, Measurement, WorldFactory, measure_case
 from sim.twin import Twin
 
 SEED = 12345
