@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from gfimu.base.files.memory import MemoryLimit, MemoryLimitError, with_memory
     from gfimu.base.files.model_files import find_model, list_models
     from gfimu.base.files.rerun_stream import markdown
+    from gfimu.base.lazy_names import homes_of
     from gfimu.base.results.colours import PAGE, chip_colour, css
     from gfimu.base.units import STANDARD_GRAVITY
 else:

@@ -9,7 +9,7 @@ Rooms, each of which imports itself and those before it: `data`, `terms`, `fit`,
 from typing import TYPE_CHECKING
 
 from gfimu.base.lazy_names import declared_names
-from gfimu.diagnosis.diagnose import diagnose
+from gfimu.diagnosis.diagnose import diagnose  # at once: later its own module would hide it
 
 if TYPE_CHECKING:
     from gfimu.diagnosis.criticism.reading_curve import reading_curve

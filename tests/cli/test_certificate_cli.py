@@ -7,7 +7,6 @@ import pytest
 
 import gfimu
 from gfimu import Calibration
-from gfimu.calibration.parameter_names import parameter_names
 
 METHODS = (
     ("six-position", 12),
@@ -84,7 +83,8 @@ def test_a_calibration_is_compared_with_a_calibration_or_a_certificate(gfimu_com
 
 
 def gyro():
-    names = parameter_names("gyro", "x_axis")
+    free = ("M_xx", "M_yx", "M_yy", "M_zx", "M_zy", "M_zz", "b_x", "b_y", "b_z")
+    names = tuple(f"gyro_{name}" for name in free)
     channels = ("gyro_x", "gyro_y", "gyro_z")
     values = np.array([1.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
     return Calibration("gyro", "rad_s", channels, "x_axis", 7.3e-5, names, values, 1e-8 * np.eye(9))

@@ -12,7 +12,6 @@ from pathlib import Path
 import pytest
 
 from gfimu import catalogue
-from gfimu.commands.shell.completion import effects, shown
 
 PROGRAM = [sys.executable, "-c", "from gfimu.commands.shell.program import main; main()"]
 
@@ -69,12 +68,12 @@ def test_bash_is_offered_names_and_values(completed, line, offered):
     assert completed(line) == offered
 
 
-def test_the_names_of_effects_are_those_of_the_library():
+def test_the_names_of_effects_are_those_of_the_library(completed):
     from sim.effects import added_effects
 
     listed = [name for name in catalogue("effects") if name not in added_effects()]
-    assert [name for name, _ in effects("")] == [name for name in listed if name != "unknown"]
-    assert set(listed) <= {name for name, _ in shown("")}
+    assert completed("gfimu design ") == [name for name in listed if name != "unknown"]
+    assert set(listed) <= set(completed("gfimu show "))
 
 
 @pytest.mark.parametrize(

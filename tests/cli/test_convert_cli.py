@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from gfimu import Calibration
-from gfimu.calibration.parameter_names import parameter_names
 from gfimu.recording import Recording
 
 
@@ -81,7 +80,8 @@ def test_an_odd_file_never_ends_in_a_traceback(gfimu_command, tmp_path, name):
 
 
 def test_a_calibration_is_written_for_others(gfimu_command, tmp_path):
-    names = parameter_names("a1", "x_axis")
+    free = ("M_xx", "M_yx", "M_yy", "M_zx", "M_zy", "M_zz", "b_x", "b_y", "b_z")
+    names = tuple(f"a1_{name}" for name in free)
     values = np.array([26.0 * (name[-1] == name[-2] and "_M_" in name) + ("_b_" in name) for name in names])
     channels = ("a11", "a12", "a13")
     Calibration("multi-position", "lsb", channels, "x_axis", 9.81, names, values, np.eye(9)).save(tmp_path / "cal.json")

@@ -12,7 +12,7 @@ from every_item import every
 
 import gfimu
 from gfimu.commands import program
-from gfimu.commands.shell.command_list import COMMANDS, JOBS
+from gfimu.commands.shell.command_list import COMMANDS, JOBS, help_line
 from gfimu.commands.shell.help_text import examples_of
 
 GROUPS = ("benchmark", "campaign", "firmware")
@@ -48,6 +48,12 @@ CHEAP = (
     "gfimu tolerance cube12 --closed-form --part adxl355 --calibrated poses+rest",
 )
 """Examples that need no file and take a second or two."""
+
+
+@every("name", sorted(COMMANDS))
+def test_the_list_of_commands_prints_the_first_line_of_each_ones_help(name):
+    assert ALL[name].name == name
+    assert help_line(name) == " ".join(ALL[name].help.partition("\n\n")[0].split())
 
 
 @every("words", ALL)

@@ -2,6 +2,7 @@
 
 import ast
 import graphlib
+import importlib
 import inspect
 import re
 from collections import Counter
@@ -10,11 +11,12 @@ import pytest
 from every_item import every
 
 import gfimu
+from gfimu.base import homes_of
 from gfimu.model import BodyModel
 from sim.twin import Twin
 
 from .figures import figures
-from .house import IMPORTS, IMPORTS_BY_TYPES, MODULES, ROOMS, ROOT, imports, inside, is_type_checking
+from .house import IMPORTS, IMPORTS_BY_TYPES, MODULES, ROOMS, ROOT, imported_names, imports, inside, is_type_checking
 from .limits import LIMITS
 from .page import PAGE, page
 
@@ -108,6 +110,16 @@ def test_dir_lists_the_public_names():
 @every("name", gfimu.__all__)
 def test_public_names_can_be_imported(name):
     assert getattr(gfimu, name) is not None
+
+
+FACES = [name for name, module in MODULES.items() if " = declared_names(" in module.source]
+
+
+@every("face", FACES)
+def test_what_a_face_declares_can_be_imported_and_is_hidden_by_no_module(face):
+    names = dir(importlib.import_module(face))
+    assert not {f"{face}.{name}" for name in names} & MODULES.keys()
+    assert [name for name in names if getattr(importlib.import_module(face), name) is None] == []
 
 
 def test_unknown_public_name():
@@ -204,7 +216,10 @@ def test_the_diagnosis_says_in_which_order_its_rooms_stand():
 
 def test_every_module_of_the_diagnosis_has_a_test_that_imports_it():
     tests = (ROOT / "tests" / "gfimu" / "diagnosis").rglob("test_*.py")
-    imported = set().union(*(imports(ast.parse(file.read_text(encoding="utf-8"))) for file in tests))
+    trees = [ast.parse(file.read_text(encoding="utf-8")) for file in tests]
+    homes = {f"gfimu.diagnosis.{name}": home for name, home in homes_of("gfimu.diagnosis").items()}
+    by_face = {homes[name] for tree in trees for name in imported_names(tree, by_types=False) if name in homes}
+    imported = by_face.union(*map(imports, trees))
     rooms = [f"gfimu.diagnosis.{room}" for room in DIAGNOSIS]
     modules = {name for name, one in MODULES.items() if inside(name, *rooms) and one.file.name != "__init__.py"}
     assert modules - imported == set()

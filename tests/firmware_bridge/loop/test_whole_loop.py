@@ -10,6 +10,7 @@ import pytest
 
 pytest.importorskip("unicorn", reason="the emulator is in the extra 'firmware'")
 
+import gfimu
 from firmware_bridge import (
     TICKS_PER_SECOND,
     Adxl345Options,
@@ -27,7 +28,6 @@ from firmware_bridge import (
     typical_chips,
 )
 from gfimu import AccelerometerArray, InputError
-from gfimu.motion.estimation import estimate
 from gfimu.recording import Recording
 from sim import prescribed_readings
 from sim.ride import Ride
@@ -138,7 +138,7 @@ def test_equals_the_direct_simulation_within_quantisation_and_the_declared_skew(
 
 def test_estimate_from_the_loop_follows_the_table(looped: Recording) -> None:
     array = AccelerometerArray.load("cube12")
-    found = estimate(looped, array)
+    found = gfimu.estimate(looped, array)
     truth = Ride("paper_run").references(looped.t_s)["command_rad_s"]
     error = found.omega[:, 2] - truth
     assert np.sqrt(np.nanmean(error**2)) < 0.05

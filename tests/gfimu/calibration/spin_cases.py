@@ -6,8 +6,7 @@ import numpy as np
 
 from gfimu import AccelerometerArray, specific_force
 from gfimu.base import STANDARD_GRAVITY
-from gfimu.calibration import SpinPolicy, calibrate
-from gfimu.calibration.spin import spin
+from gfimu.calibration import METHODS, SpinPolicy, calibrate
 from gfimu.recording import Recording, array_metadata
 from sim import PoseSequence, Sensor, SensorSettings, speed_sweep, spin_profile
 from sim.forward import leaning, rigid_readings, table_geometry
@@ -115,7 +114,7 @@ def normalised_errors(seed, sides=(UPRIGHT, ON_ITS_SIDE), settings=None):
     result = unit.static(rng)
     for side in sides:
         unit = unit.switched_on_again(rng)
-        result = spin(unit.turn(rng, side), CUBE, start=result)
+        result = METHODS["spin"].fit(unit.turn(rng, side), CUBE, start=result)
     found = {}
     for kind, truth in unit.truth.items():
         names = [f"{chip}_{kind}_{axis}" for chip in result.chips for axis in "xyz"]

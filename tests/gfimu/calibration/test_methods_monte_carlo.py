@@ -5,13 +5,13 @@ import pytest
 from calibration_cases import FACES, GRAVITY, MULTI, TWELVE, assert_honest, simulate
 
 from gfimu.array import EARTH_RATE
-from gfimu.calibration import ErrorModel, Observations, multi_position_gyro
-from gfimu.calibration.multi_position import multi_position
-from gfimu.calibration.recursive import recursive
-from gfimu.calibration.six_position import six_position
-from gfimu.calibration.twelve_position import twelve_position
+from gfimu.calibration import METHODS, ErrorModel, Observations, multi_position_gyro
 
 RUNS = 300
+
+six_position, recursive, multi_position, twelve_position = (
+    METHODS[name].fit for name in ("six-position", "recursive", "multi-position", "twelve-position")
+)
 
 CASES = {
     "six-position, 12": (six_position, FACES, "poses", {}),

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from gfimu import InputError
-from gfimu.calibration import averaged_poses, calibrate, every_sample, read_text_triad
-from gfimu.calibration.multi_position import multi_position
+from gfimu.calibration import METHODS, averaged_poses, calibrate, every_sample, read_text_triad
 from gfimu.recording import detect_rest
 
 GRAVITY = 9.81744
@@ -49,7 +48,7 @@ def test_imu_tk_solutions(recording, kind):
             observations = every_sample(recording, replace(rest, stop=rest.start + 100))
         else:
             observations = averaged_poses(recording, rest)
-        result = multi_position(observations, gravity=GRAVITY, gauge="z_axis", weighting="uniform")
+        result = METHODS["multi-position"].fit(observations, gravity=GRAVITY, gauge="z_axis", weighting="uniform")
         miss = np.linalg.norm(result.models["a1"].correct(observations.readings), axis=1) - GRAVITY
         if best is None or miss @ miss < best[0]:
             best = miss @ miss, result

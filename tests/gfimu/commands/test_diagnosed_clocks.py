@@ -9,26 +9,14 @@ import numpy as np
 import pytest
 
 import gfimu
-from gfimu import Diagnosis, NamedCause
-from gfimu.diagnosis.criticism.gain import Gain
-from gfimu.diagnosis.verdict.parts import NoiseLevels, Residual, Unexplained
+from gfimu import NamedCause
 from gfimu.recording import ReferenceSeries
 from sim.trials import Measurement, measure
 from sim.twin import Twin
+from tests.gfimu.diagnosis.made_diagnoses import made_diagnosis
 
 TWIN = Twin.load("cube12_turntable")
-NOTHING = Diagnosis(
-    verdict="nothing_found",
-    causes=(),
-    residual=Residual(0.1, 0.1, 0.1, {}, {}),
-    gain=Gain(),
-    unexplained=Unexplained(),
-    rivals=(),
-    twin=TWIN,
-    runs=(),
-    sentences=("Nothing.",),
-    noise=NoiseLevels(),
-)
+NOTHING = replace(made_diagnosis("nothing_found"), twin=TWIN, runs=())
 CLOCK_ERROR = NamedCause("clock_error", {"ratio": 0.0035}, {"ratio": 1e-6}, 0.99)
 
 

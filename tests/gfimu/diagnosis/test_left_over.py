@@ -10,9 +10,7 @@ from usual_twin import UsualTwin
 
 from gfimu import AccelerometerArray
 from gfimu.base import STANDARD_GRAVITY
-from gfimu.diagnosis import Policy, diagnose, make_stretches, prepare, starting_point
-from gfimu.diagnosis.criticism.series_tests import lines
-from gfimu.diagnosis.fit.observed_at import observed_at
+from gfimu.diagnosis import diagnose
 from gfimu.recording import Recording
 from sim.effects import make_effect
 from sim.trials import Measurement, measure
@@ -73,23 +71,6 @@ def test_a_scale_factor_and_a_quadratic_are_no_cubic(twin):
     found = diagnose([recorded(twin, 5, lambda t, readings: None, hidden)], twin)
     assert {cause.effect for cause in found.causes} == {"scale_factor", "quadratic"}
     assert not found.unexplained.significant
-
-
-def test_a_line_far_beyond_the_smallest_probability_has_finite_odds(twin):
-    amplitude = 2.0
-
-    def ring(t, readings):
-        readings += amplitude * np.sin(2 * np.pi * 11.0 * t)[:, None]
-
-    prepared = prepare([recorded(twin, 3, ring)], twin, ["run"])
-    stretches = make_stretches(twin, prepared.runs, prepared.effects)
-    point = starting_point(stretches, Policy().knots)
-    found = lines(stretches[0], observed_at(stretches, point)[0])
-    # |Σ y e^{−iωt}|²/n of a tone is nA²/4, in units of the noise; what leaks from it raises the floor it stands on.
-    noise = point.levels[0].white[:-1]
-    most = np.sum(len(stretches[0].run.t) * amplitude**2 / 4 / noise**2)
-    assert 0.1 * most < found.log_odds < most
-    assert "tone at 11.0" in found.signature
 
 
 @pytest.mark.study

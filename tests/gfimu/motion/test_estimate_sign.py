@@ -7,9 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gfimu import AccelerometerArray, Estimate, Recording, specific_force, summarise
+from gfimu import AccelerometerArray, Estimate, Recording, estimate, specific_force, summarise
 from gfimu.array import PartLimits
-from gfimu.motion.estimation import estimate
 from gfimu.visual import free_rate_plots
 
 CUBE = AccelerometerArray.load("cube12")

@@ -9,7 +9,6 @@ import pytest
 
 from gfimu import AccelerometerArray
 from gfimu.diagnosis import Policy, make_stretches, prepare_run, starting_point
-from gfimu.diagnosis.data.stretch import moved
 from gfimu.recording import Recording, ReferenceSeries, join_reference, reference_on_rows, reference_series
 from sim.twin import Twin
 
@@ -96,9 +95,3 @@ def test_a_joined_reference_has_its_own_values_and_times():
     t, values = reference_series(joined.recording, "tacho_rad_s")
     np.testing.assert_array_equal(values, series.columns["tacho_rad_s"])
     np.testing.assert_allclose(t, read_at, atol=4.0 * joined.alignment.offset_std + 1e-4)
-
-
-def test_smooth_values_are_moved_by_a_cubic():
-    share = np.random.default_rng(3).uniform(-0.5, 0.5, len(T))
-    values = np.sin(2 * np.pi * T)
-    np.testing.assert_allclose(moved(values, share), np.sin(2 * np.pi * (T + 0.01 * share)), atol=2e-6)

@@ -27,7 +27,7 @@ from firmware_bridge.lpc1768.build import BuildReport
 from firmware_bridge.strict.check import CheckReport
 from firmware_bridge.strict.findings import Finding
 from gfimu import CampaignStatus, DemoResult
-from gfimu.base.lazy_names import homes_of
+from gfimu.base import homes_of
 from gfimu.base.results import PlottedResult, TableResult
 from gfimu.commands.benchmark_results import BenchmarkRun
 from gfimu.commands.demo_steps import Row

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from gfimu import AccelerometerArray, ErrorSources, InputError, drift_budget, equivalent_rate_drift, monte_carlo_drift
 from gfimu.budget import motion_covariance, position_error
-from gfimu.budget.drift.budget import TILT_LIMIT
 
 G = 9.80665
 MG = G / 1000
@@ -200,7 +199,7 @@ def test_beyond_the_limit_the_closed_form_fails_as_stated(cube):
     assert limit.tilt_std == pytest.approx(2.02, abs=0.01)
     # ½ b t² = 0.25 rad
     sd_alpha = 35 * MG / (np.sqrt(8) * 0.03)
-    assert limit.valid_until == pytest.approx(np.sqrt(2 * TILT_LIMIT / sd_alpha), rel=1e-3)
+    assert limit.valid_until == pytest.approx(np.sqrt(2 * 0.25 / sd_alpha), rel=1e-3)
     sample = monte_carlo_drift(cube, 1.0, sources, runs=300, rng=np.random.default_rng(3))
     assert sample.std[-1, 0] / limit.total_std[0] == pytest.approx(0.63, abs=4 * sample.relative_sampling_error)
 

@@ -8,8 +8,7 @@ from certification_cases import calibration_of, random_covariance, random_model,
 from scipy.stats import norm
 
 from gfimu import InputError, UnitError
-from gfimu.calibration import Observations, certify, compare
-from gfimu.calibration.multi_position import multi_position
+from gfimu.calibration import METHODS, Observations, certify, compare
 
 
 def rows_of(first, second):
@@ -71,7 +70,8 @@ def test_two_laboratories_with_other_poses_agree(rng):
     truth = replace(random_model(rng), quadratic=np.zeros(3))
     bad, pairs = np.zeros(9), 100
     for _ in range(pairs):
-        found = [certify(multi_position(noisy_poses(truth, count, rng), gravity=9.81)) for count in (24, 40)]
+        poses = [noisy_poses(truth, count, rng) for count in (24, 40)]
+        found = [certify(METHODS["multi-position"].fit(observed, gravity=9.81)) for observed in poses]
         rows = rows_of(*found)
         names = [term.name for term in found[0].chips[0].intrinsic]
         bad += [not rows[name].satisfactory for name in names]

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_fits import DURATION, channel, fitted, quiet, recorded
+from made_fits import DURATION, POLICY, channel, fitted, quiet, recorded, twin
 
+from gfimu.diagnosis import make_stretches, prepare, starting_point
 from gfimu.diagnosis.criticism.generic import motion_of
 from gfimu.diagnosis.criticism.series_tests import changing_noise, jumps, lines
 from gfimu.diagnosis.data.rounding import Steps
@@ -46,6 +47,23 @@ def test_a_tone_is_found_in_its_series(place, name):
     assert found.log_odds > LIKELY
     assert found.signature.startswith(f"{name} has a tone at 17.")
     assert float(found.signature.split()[-2]) == pytest.approx(17.3, abs=0.6 / DURATION)
+
+
+def test_a_loud_tone_of_a_run_has_the_odds_of_its_energy():
+    amplitude = 2.0
+
+    def ring(t, spin, readings, reference):
+        readings += amplitude * np.sin(2 * np.pi * 11.0 * t)[:, None]
+
+    prepared = prepare([recorded(3, ring)], twin(), ["run"])
+    stretches = make_stretches(twin(), prepared.runs, prepared.effects)
+    point = starting_point(stretches, POLICY.knots)
+    found = lines(stretches[0], observed_at(stretches, point)[0])
+    # |Σ y e^{−iωt}|²/n of a tone is nA²/4, in units of the noise; what leaks from it raises the floor it stands on.
+    noise = point.levels[0].white[:-1]
+    most = np.sum(len(stretches[0].run.t) * amplitude**2 / 4 / noise**2)
+    assert 0.1 * most < found.log_odds < most
+    assert "tone at 11.0" in found.signature
 
 
 def test_the_reference_is_no_witness_where_it_has_coarse_steps():

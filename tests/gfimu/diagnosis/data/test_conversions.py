@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from gfimu.diagnosis import Run, predicted_by_reference, prepare_run
 from gfimu.diagnosis.data.conversions import Conversions
 from gfimu.diagnosis.data.run import smooth_rate
+from gfimu.diagnosis.data.stretch import moved
 from gfimu.diagnosis.data.table.settling import settled
 from gfimu.recording import Recording
 from sim import SpinState
@@ -82,3 +83,9 @@ def test_a_clock_that_the_marks_leave_open_is_found_beside_a_lag_of_all_and_a_wr
 def test_a_run_that_leaves_nothing_open_stays_as_it_is():
     run = prepare_run(recording(np.zeros((len(T), 4)), output_data_rate_hz=400.0), TWIN)
     assert settled(run, run.readings, CHIP, run.reference) is run
+
+
+def test_smooth_values_are_moved_by_a_cubic():
+    share = np.random.default_rng(3).uniform(-0.5, 0.5, len(T))
+    values = np.sin(2 * np.pi * T)
+    np.testing.assert_allclose(moved(values, share), np.sin(2 * np.pi * (T + 0.01 * share)), atol=2e-6)

@@ -1,13 +1,27 @@
-"""Likelihood of coarsely rounded readings: derivatives by finite differences, and recovery of a mean and a noise."""
+"""Likelihood of coarsely rounded readings, recovery of a mean and a noise, and what passes between steps."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy.stats import norm
 
-from gfimu.diagnosis.data.rounding import Steps, common_step, rounded_likelihood, rounding_noise
+from gfimu.diagnosis.data.rounding import Steps, between_steps, common_step, rounded_likelihood, rounding_noise
+
+STEP = 1 / 16
+
+
+def warming(t):
+    return 25.0 + 3.0 * (1.0 - np.exp(-t / 12.0)) + 0.3 * np.sin(0.3 * t)
+
+
+def rounded(values, step=STEP):
+    return np.round(values / step) * step
+
+
+def rms(values):
+    return float(np.sqrt(np.mean(values**2)))
 
 
 @pytest.mark.parametrize("quantum", [0.5, 3.0, 10.0])
@@ -76,3 +90,34 @@ def test_readings_far_off_and_near_are_expanded_alike(quantum):
     far = rounded_likelihood(np.append(error, [[40.0]], axis=0), quantum, 1.0)
     for one, other in ((near.residual, far.residual), (near.weight, far.weight), (near.deviance, far.deviance)):
         assert_allclose(one, other[:-1], rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("rate", [10.0, 400.0])
+def test_what_passes_through_the_steps_is_close_to_the_truth(rate):
+    t = np.arange(0.0, 40.0, 1.0 / rate)
+    truth = warming(t)
+    found = between_steps(t, rounded(truth))
+    assert np.abs(found - truth).max() < 0.6 * STEP
+    assert rms(found - truth) < 0.25 * rms(rounded(truth) - truth)
+
+
+def test_a_little_noise_makes_it_better_than_the_steps_still():
+    rng = np.random.default_rng(1)
+    t = np.arange(0.0, 40.0, 0.01)
+    truth = warming(t)
+    readings = rounded(truth + 0.005 * rng.standard_normal(len(t)))
+    assert rms(between_steps(t, readings) - truth) < 0.5 * rms(readings - truth)
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        np.full(500, 25.0),
+        rounded(25.0 + 0.001 * np.arange(50)),  # one step is none
+        25.0 + 0.01 * np.random.default_rng(2).standard_normal(500),
+        rounded(25.0 + 0.2 * np.random.default_rng(3).standard_normal(500)),
+    ],
+    ids=["constant", "one step", "no steps", "noise larger than the steps"],
+)
+def test_what_has_no_steps_to_see_is_left_as_it_is(values):
+    assert_array_equal(between_steps(np.arange(len(values)) / 100.0, values), values)

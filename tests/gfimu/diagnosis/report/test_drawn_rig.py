@@ -1,4 +1,4 @@
-"""How the array of a diagnosis is drawn: on a table, or on the arm of a pendulum whose axis is level."""
+"""The picture of a diagnosis: its array on a table or on the arm of a pendulum, and its words."""
 
 from __future__ import annotations
 
@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 from made_diagnoses import made_diagnosis
 
+from gfimu import NamedCause
 from gfimu.commands.diagnose import drawn_rig
 from gfimu.diagnosis import DrawnRig
-from gfimu.diagnosis.report.picture import _motion
+from gfimu.diagnosis.report.picture import _motion, _notes
+from gfimu.diagnosis.report.plain_words import parameter_units
 from sim.twin import Twin
 
 
@@ -52,3 +54,13 @@ def test_a_table_is_drawn_as_before():
     assert rig.lean is None
     assert set(rig.shapes) >= {"base", "table", "cube"}
     np.testing.assert_allclose(DrawnRig().places(np.array([0.3]))[0], [0.0, 0.0, 0.06])
+
+
+def test_the_picture_prints_a_parameter_in_the_unit_that_its_effect_declares():
+    found = made_diagnosis()
+    key = "a11_m_s2_per_rad4_s4"
+    cause = NamedCause("vibration_rectification", {key: 5.8e-6}, {key: 2e-7}, 0.99)
+    units = parameter_units(found, cause)
+    assert units[key] == "m/s²/(rad/s)⁴"
+    assert "a11 (5.80 ± 0.20)·10⁻⁶ m/s²/(rad/s)⁴ (probability" in _notes(replace(found, causes=(cause,)))
+    assert parameter_units(found, replace(cause, effect="not in the library")) == {}

@@ -10,7 +10,6 @@ from core_cases import cause_of, small_twin
 from numpy.testing import assert_allclose
 
 from gfimu.diagnosis import Cause, effects_of, mixing_of
-from gfimu.diagnosis.terms.cause import SMALLEST_POSITIVE
 from sim.effects import EFFECTS
 
 ARRAY = small_twin().array
@@ -48,9 +47,9 @@ def test_a_shape_at_the_end_of_its_range_is_noticed(damping, ends):
 def test_what_is_positive_stays_so():
     lag = cause_of("sensor_lag", ARRAY, [0.5])
     low, high = lag.limits(ARRAY)
-    assert low.tolist() == [SMALLEST_POSITIVE]
+    assert low.tolist() == [1e-6]
     assert lag.positive(ARRAY).tolist() == [True]
-    assert lag.moved(np.array([-3.0]), ARRAY).coordinates.tolist() == [SMALLEST_POSITIVE]
+    assert lag.moved(np.array([-3.0]), ARRAY).coordinates.tolist() == [1e-6]
     tilt = cause_of("table_tilt", ARRAY, [0.5, 0.0])
     assert not tilt.positive(ARRAY).any()
     assert tilt.moved(np.array([-3.0, 1.0]), ARRAY).coordinates.tolist() == [-2.5, 1.0]

@@ -172,3 +172,23 @@ def test_confounded_effects_are_listed():
     # What is hardly seen is confounded with anything: no list is made of it.
     assert mimics(explanation, hidden.at(1e-4 * hidden.coordinates), POLICY) == []
     assert_allclose(hidden.coordinates, [2.0, -1.0])
+
+
+@pytest.mark.parametrize(
+    ("parameters", "std", "probability"),
+    [
+        ({"gain": 1.25, "frequency_hz": 38.9}, {"gain": 0.9, "frequency_hz": 47.0}, 0.9),
+        ({"gain": 1.25, "frequency_hz": 38.9}, {"gain": 0.9, "frequency_hz": 4.0}, 0.997),
+        ({"amplitude": 0.01, "phase_rad": 2.0}, {"amplitude": 0.008, "phase_rad": 0.1}, 0.9),
+        ({"channel": "a11"}, {}, 0.997),
+    ],
+)
+def test_what_does_not_stand_out_from_its_uncertainty_is_not_certain(parameters, std, probability):
+    assert capped(NamedCause("resonance", parameters, std, 0.997), POLICY).probability == probability
+    assert capped(NamedCause("resonance", parameters, std, 0.6), POLICY).probability == 0.6
+
+
+def test_a_frequency_that_is_known_makes_no_mode_certain():
+    """What a torque ripple left, named a mode: gain 0.17 ± 0.80, but a frequency of 24.5 ± 9.8 Hz, at P 0.997."""
+    mode = NamedCause("resonance", {"gain": 0.17, "frequency_hz": 24.5}, {"gain": 0.80, "frequency_hz": 9.8}, 0.997)
+    assert capped(mode, POLICY, {"frequency_hz": 24.5}).probability == 0.9

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
+from made_diagnoses import made_diagnosis
 
 from gfimu import NamedCause
 from gfimu.diagnosis.criticism.gain import Gain
@@ -99,3 +102,12 @@ def test_notes_come_last_in_order():
         "resonance was withdrawn: it did not predict held-out data.",
     )
     assert words[2].startswith("The twin's calibration is a little off everywhere, by what a good calibration leaves")
+
+
+@pytest.mark.study
+def test_causes_that_explain_in_part_of_a_whole_diagnosis():
+    whole = made_diagnosis("explained")
+    gain = replace(whole.gain, share_of_excess_removed=0.67)
+    sentences = verdict_sentences("explained", whole.causes, whole.residual, gain, whole.unexplained, ())
+    assert sentences[0].startswith("The simulation is wrong in part because of table_tilt: 67 % of the excess is gone")
+    assert any("so much more than on validation data" in sentence for sentence in sentences)

@@ -5,8 +5,8 @@ import pytest
 
 import gfimu
 from gfimu import AccelerometerArray, InputError
+from gfimu.array import omega_products
 from gfimu.recording import Recording, ReferenceSeries, join_reference, open_reference
-from gfimu.recording.joining.signals import functions_of
 from sim.trials import Measurement, measure
 from sim.twin import Twin
 
@@ -80,7 +80,8 @@ def test_a_gyro_of_a_free_body_is_aligned():
         return np.sum(np.sin(speeds * at[:, None, None] + phases), axis=2)
 
     coefficients = np.random.default_rng(6).standard_normal((9, 6)) * 0.05
-    readings = functions_of(rate(t), 0.01) @ coefficients + 0.02 * np.random.default_rng(7).standard_normal((len(t), 6))
+    functions = np.column_stack([omega_products(rate(t)), np.gradient(rate(t), 0.01, axis=0)])
+    readings = functions @ coefficients + 0.02 * np.random.default_rng(7).standard_normal((len(t), 6))
     names = tuple(f"a{chip}{axis}" for chip in (1, 2) for axis in (1, 2, 3))
     times = np.arange(2.0, 26.0, 0.008)
     gyro = rate(times) + 0.01 * np.random.default_rng(8).standard_normal((len(times), 3))

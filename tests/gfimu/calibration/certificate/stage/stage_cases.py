@@ -2,23 +2,16 @@
 
 import numpy as np
 
+from gfimu.calibration import METHODS as RECORDS
 from gfimu.calibration import ErrorModel, Observations
-from gfimu.calibration.multi_position import multi_position
-from gfimu.calibration.recursive import recursive
-from gfimu.calibration.six_position import six_position
-from gfimu.calibration.twelve_position import twelve_position
 from tests.gfimu.calibration.calibration_cases import FACES, GRAVITY, MULTI, TWELVE
 
 PERFECT = ErrorModel(np.eye(3), np.zeros(3))
 SKEW = ErrorModel(
     np.array([[1.01, 0.01, -0.005], [0.008, 0.99, 0.01], [-0.01, 0.006, 1.02]]), np.array([0.1, -0.2, 0.05])
 )
-METHODS = {
-    "six-position": (six_position, FACES),
-    "recursive": (recursive, FACES),
-    "twelve-position": (twelve_position, TWELVE),
-    "multi-position": (multi_position, MULTI),
-}
+POSES = {"six-position": FACES, "recursive": FACES, "twelve-position": TWELVE, "multi-position": MULTI}
+METHODS = {name: (RECORDS[name].fit, poses) for name, poses in POSES.items()}
 
 
 def calibration_of(name, model=SKEW, **options):
