@@ -12,9 +12,9 @@ from every_item import every
 from test_docs_words import VAGUE
 
 from gfimu.base.errors import InputError
-from gfimu.base.files.model_files import effect_catalogue
 from gfimu.diagnosis.design.proposal import SEPARATED
 from gfimu.diagnosis.policy import Policy
+from gfimu.model.effect_catalogue import effect_catalogue
 from sim.effects import (
     BODY_EFFECTS,
     CARRIAGE_EFFECTS,

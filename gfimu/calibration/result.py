@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.array.array import AccelerometerArray
-from gfimu.base.declared import Declared, Matrix, Table, cell, figure, plain, table
+from gfimu.base.declared import Declared, Matrix, Table, cell, figure, table
 from gfimu.base.errors import InputError, UnitError
 from gfimu.base.files.atomic_file import write_text
 from gfimu.base.files.input_file import LARGEST_TEXT, check_input
@@ -386,7 +386,7 @@ class Calibration(Declared, PlottedResult):
 
     def save(self, path: str | Path) -> None:
         """Write the calibration as JSON, whole or not at all."""
-        write_text(path, json.dumps(plain(self.to_dict()), indent=1, allow_nan=False) + "\n")
+        write_text(path, json.dumps(self.to_dict(), indent=1, allow_nan=False) + "\n")
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], *, source: str = "calibration") -> Calibration:

@@ -13,7 +13,6 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from gfimu.base.files.outputs import KALIBR
 from gfimu.commands.known_axis import AXIS_PLACE, AxisLike, as_known_axis
 from gfimu.commands.shell.declare import Option, command
 from gfimu.commands.shell.options import (
@@ -26,6 +25,7 @@ from gfimu.commands.shell.options import (
     REST_THRESHOLD,
     SPEED_RAD_S,
 )
+from gfimu.commands.shell.output_files import KALIBR
 
 if TYPE_CHECKING:
     from gfimu.array.array import AccelerometerArray

@@ -14,8 +14,8 @@ from gfimu.base.declared import Declared, Table, figure
 from gfimu.base.errors import InputError, unknown_name
 from gfimu.base.results import Panel, PlottedResult, Series, text_column
 from gfimu.base.short_repr import short_repr
-from gfimu.base.units import TIME_COLUMNS
 from gfimu.recording import Recording
+from gfimu.recording.quantities import TIME_COLUMNS
 from gfimu.recording.rest import detect_rest
 from gfimu.recording.timing.reference_times import reference_series
 from gfimu.sensor_noise.identification import TERMS, NoiseModel, identify_noise

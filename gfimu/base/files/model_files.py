@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import importlib.util
-import json
 import re
 import tomllib
-from collections.abc import Callable, Mapping
-from functools import cache
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +13,6 @@ from gfimu.base.errors import InputError, unknown_name
 from gfimu.base.files.input_file import LARGEST_TEXT, check_input, is_ordinary
 
 __all__ = [
-    "EFFECT_CATALOGUE",
-    "effect_catalogue",
     "find_model",
     "list_models",
     "models_directory",
@@ -24,9 +20,6 @@ __all__ = [
     "read_toml",
     "set_key",
 ]
-
-EFFECT_CATALOGUE = "effects/catalogue.json"
-"""File of what was computed of each effect, below the folder of the models."""
 
 _LONGEST_REASON = 160
 _MOST_PARTS = 100  # numerical: of a dotted key
@@ -53,13 +46,6 @@ def models_directory() -> Path:
 def list_models(kind: str, suffix: str = ".toml") -> list[str]:
     """Names of the models of one kind (``arrays``, ``scenarios``, ``twins``, ``parts``, ``mjcf``)."""
     return sorted(path.stem for path in (models_directory() / kind).glob(f"*{suffix}"))
-
-
-@cache
-def effect_catalogue() -> Mapping[str, Any]:
-    """Return what was computed of each effect of gfimu, by name; empty where nothing is stored."""
-    file = models_directory() / EFFECT_CATALOGUE
-    return json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
 
 
 def find_model(kind: str, name: str | Path, *, beside: Path | None = None, suffix: str = ".toml") -> Path:

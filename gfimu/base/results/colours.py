@@ -5,8 +5,8 @@ with the hue turned by the golden angle from chip to chip. A chip's hue follows 
 in each picture, and neighbours in number are far apart in hue. The sensing axes of a chip differ in lightness.
 
 Body axes follow the field's convention (x red, y green, z blue). What was before is orange and what came after is blue
-(vermilion and blue of M. Okabe and K. Ito, 2008, on paper). The sets in `SEPARATED` stay apart for the colour-blind;
-the tests simulate their vision.
+(vermilion and blue of M. Okabe and K. Ito, 2008, on paper). The colours of one picture stay apart for the
+colour-blind; the tests simulate their vision.
 """
 
 from __future__ import annotations
@@ -35,7 +35,6 @@ __all__ = [
     "NOISE_ON_PAPER",
     "PAGE",
     "PALE",
-    "SEPARATED",
     "SPIN_AXIS",
     "SPIN_AXIS_ON_PAPER",
     "STYLES",
@@ -142,15 +141,6 @@ HEALTH: Mapping[str, Colour] = {
     "stuck": (64, 132, 224),
 }
 """Of the health of a channel, by the word that is written in its lane."""
-
-SEPARATED: Mapping[str, Mapping[str, Colour]] = {
-    "run": {"truth": TRUTH, "estimate": ESTIMATE, "tacho": TACHO, "command": COMMAND},
-    "body axes": dict(zip("xyz", AXES, strict=True)),
-    "body axes on paper": dict(zip("xyz", AXES_ON_PAPER, strict=True)),
-    "comparison": {"measured": MEASURED, "before": BEFORE, "after": AFTER},
-    "report": {"noise": NOISE_ON_PAPER, "before": BEFORE_ON_PAPER, "after": AFTER_ON_PAPER, "ink": INK},
-}
-"""Colours of one picture that a reader has to distinguish, by picture."""
 
 _GOLDEN_TURN = (np.sqrt(5.0) - 1.0) / 2.0
 _FIRST_HUE = 80.0  # degrees; of those tried in steps of 10, the colour-blind see the first eight chips best apart

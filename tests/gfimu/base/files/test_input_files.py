@@ -108,7 +108,7 @@ def listening(session: int) -> list[str]:
 @pytest.mark.parametrize("mode", [["--serve-grpc"], ["--web-viewer", "--web-viewer-port", "19881"]])
 def test_the_viewer_listens_on_this_machine_only(mode):
     pytest.importorskip("rerun")
-    from gfimu.base.files.rerun_stream import viewer_command
+    from gfimu.visual.viewer import viewer_command
 
     wanted = len(mode) // 2 + 1
     command = viewer_command(*mode, "--port", "19880")

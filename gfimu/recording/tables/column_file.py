@@ -23,7 +23,8 @@ from gfimu.base.errors import InputError, one_line
 from gfimu.base.files.atomic_file import atomic_path
 from gfimu.base.files.input_file import LONGEST_LINE, MOST_COLUMNS, check_input
 from gfimu.base.files.memory import JSON_GROWS, MemoryLimit
-from gfimu.base.files.table import (
+from gfimu.base.files.metadata import schema_metadata, to_json
+from gfimu.recording.tables.arrow import (
     ArrowStream,
     arrow_column,
     as_found,
@@ -31,10 +32,8 @@ from gfimu.base.files.table import (
     from_json,
     metadata_of_schema,
     numbers,
-    schema_metadata,
-    to_json,
 )
-from gfimu.base.files.table_columns import TableColumns
+from gfimu.recording.tables.table_columns import TableColumns
 
 __all__ = ["ColumnFile", "check_columns", "head_line", "open_columns", "open_parquet", "write_columns"]
 

@@ -21,8 +21,6 @@ __all__ = [
     "from_json",
     "metadata_of_schema",
     "numbers",
-    "schema_metadata",
-    "to_json",
 ]
 
 _FOREIGN_METADATA = {"ARROW:schema", "pandas"}
@@ -41,16 +39,6 @@ class ArrowStream(Protocol):
 def column_type(values: NDArray[Any]) -> pa.DataType:
     """Return the Arrow type of a column."""
     return pa.array(values).type if values.dtype == object else pa.from_numpy_dtype(values.dtype)
-
-
-def schema_metadata(metadata: Mapping[str, Any]) -> dict[bytes, bytes]:
-    """Return metadata as the schema of an Arrow table or a Parquet file holds them."""
-    return {key.encode(): to_json(value).encode() for key, value in metadata.items()}
-
-
-def to_json(value: Any) -> str:
-    """JSON of a metadata value; NumPy arrays and numbers as lists and numbers."""
-    return json.dumps(value, default=lambda item: item.tolist() if hasattr(item, "tolist") else str(item))
 
 
 def from_json(text: str) -> Any:
