@@ -102,7 +102,5 @@ def impact(
     if estimate is not None:
         measured.motion.write(estimate)
     if picture is not None:
-        from gfimu.motion.impact.picture import impact_picture
-
-        impact_picture(picture, measured)
+        measured.to_picture(picture)
     return measured

@@ -120,7 +120,5 @@ def noise(
     if kalibr is not None:
         write_text(kalibr, kalibr_yaml(result))
     if picture is not None:
-        from gfimu.sensor_noise.pictures import noise_picture
-
-        noise_picture(picture, result)
+        result.to_picture(picture)
     return result

@@ -33,8 +33,8 @@ class Series:
         Number of the chip whose colour the series has; by default that of its place in the panel.
     role : {"", "x", "y", "z", "before", "after", "noise"}
         Body axis, or part in a comparison, whose colour the series has.
-    style : {"line", "dots", "dashes"}
-        How a line is drawn.
+    style : {"line", "dots", "dashes", "points"}
+        How a line is drawn; points are not joined.
     """
 
     name: str
@@ -64,6 +64,8 @@ class Panel:
         Quantity and unit along the line.
     scale : {"linear", "zero", "log"}
         ``zero``: the values' axis begins at zero. ``log``: it is logarithmic, and so is the axis along a line.
+    shaded : tuple of float, optional
+        Part along a line that is shaded: its first and last place.
     """
 
     title: str
@@ -72,6 +74,7 @@ class Panel:
     x: NDArray[np.float64] | tuple[str, ...]
     x_label: str = OF_TIME
     scale: str = "linear"
+    shaded: tuple[float, float] | None = None
 
     @property
     def by_name(self) -> bool:

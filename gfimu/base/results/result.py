@@ -142,6 +142,21 @@ class PlottedResult(TableResult):
 
         return drawn(self._panels(), figure)
 
+    def to_picture(self, path: str | Path) -> None:
+        """Write the picture of `plot` below the heading of the result, ``.png``, ``.svg`` or ``.pdf``.
+
+        Raises
+        ------
+        MissingPackageError
+            If matplotlib is not installed.
+        InputError
+            If the folder of the file can't be written to.
+        """
+        require("a picture", "matplotlib")
+        from gfimu.base.results.figure import write_panels
+
+        write_panels(path, self._heading(), self._panels())
+
     def log(self, stream: rr.RecordingStream, entity: str = "") -> None:
         """Log the facts and panels of the result to a rerun stream.
 
