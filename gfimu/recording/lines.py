@@ -13,7 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from gfimu.base.errors import InputError
-from gfimu.base.files.input_file import LONGEST_LINE, check_input
+from gfimu.base.files.input_file import check_input
+from gfimu.recording.reading import LONGEST_LINE
 from gfimu.recording.recording import Recording
 
 __all__ = ["recording_lines", "whole_lines"]

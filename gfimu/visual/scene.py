@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from gfimu.array.array import AccelerometerArray
-from gfimu.base.results.colours import BACKGROUND, METAL, TABLE, Colour, chip_colour
+from gfimu.base.results.colours import Colour, chip_colour
+from gfimu.visual.colours import BACKGROUND, METAL, TABLE
 
 __all__ = [
     "Body",

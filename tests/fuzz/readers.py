@@ -231,7 +231,7 @@ def _sent() -> tuple[tuple[bytes, str], ...]:
 
 def _frames(path: Path) -> None:
     from firmware_bridge.frames.decoder import SampleDecoder
-    from gfimu.base.files.input_file import read_bytes
+    from gfimu.recording.reading import read_bytes
 
     decoder = SampleDecoder()
     data = read_bytes(path)

@@ -5,7 +5,7 @@ A result describes itself once, as columns, facts and panels; tables, pages and 
 
 from gfimu.base.results.figure import drawn_chips, save_figure
 from gfimu.base.results.html import result_html
-from gfimu.base.results.panels import Panel, Series, axis_series, one_row, text_column
+from gfimu.base.results.panels import Panel, Series, axis_series, columns_of, one_row, text_column
 from gfimu.base.results.result import PlottedResult, TableResult
 
 __all__ = [
@@ -14,6 +14,7 @@ __all__ = [
     "Series",
     "TableResult",
     "axis_series",
+    "columns_of",
     "drawn_chips",
     "one_row",
     "result_html",

@@ -21,9 +21,10 @@ from numpy.typing import NDArray
 
 from gfimu.base.errors import InputError, one_line
 from gfimu.base.files.atomic_file import atomic_path
-from gfimu.base.files.input_file import LONGEST_LINE, MOST_COLUMNS, check_input
+from gfimu.base.files.input_file import check_input
 from gfimu.base.files.memory import JSON_GROWS, MemoryLimit
 from gfimu.base.files.metadata import schema_metadata, to_json
+from gfimu.recording.reading import LONGEST_LINE, MOST_COLUMNS
 from gfimu.recording.tables.arrow import (
     ArrowStream,
     arrow_column,

@@ -8,7 +8,8 @@ import pytest
 import gfimu
 from gfimu.base import plugins as loading
 from gfimu.base.errors import InputError
-from gfimu.base.plugins import GROUPS, plugins, user_function
+from gfimu.base.plugins import GROUPS, plugins
+from gfimu.model.user_code import user_function
 from gfimu.rate.registry import RateMethod, rate_method
 from gfimu.recording.formats import formats
 from gfimu.recording.importing.readers import read_foreign, readers

@@ -14,22 +14,15 @@ import pytest
 from every_item import every
 
 from gfimu.base.results.colours import (
-    AFTER,
     AFTER_ON_PAPER,
-    AXES,
     AXES_ON_PAPER,
-    BEFORE,
     BEFORE_ON_PAPER,
-    COMMAND,
-    ESTIMATE,
     INK,
-    MEASURED,
     NOISE_ON_PAPER,
-    TACHO,
-    TRUTH,
     chip_colour,
     css,
 )
+from gfimu.visual.colours import AFTER, AXES, BEFORE, COMMAND, ESTIMATE, MEASURED, TACHO, TRUTH
 
 SEPARATED = {  # colours of one picture that a reader has to distinguish, by picture
     "run": {"truth": TRUTH, "estimate": ESTIMATE, "tacho": TACHO, "command": COMMAND},

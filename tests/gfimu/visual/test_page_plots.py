@@ -10,7 +10,8 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from gfimu.base.results.colours import PAGE, TONES, chip_colour
+from gfimu.base.results.colours import chip_colour
+from gfimu.visual.colours import PAGE, TONES
 from gfimu.visual.page import Packed, enveloped, page_plots
 
 

@@ -6,7 +6,8 @@ import re
 from pathlib import Path
 
 import gfimu
-from gfimu.base.results.colours import PAGE, chip_colour, css
+from gfimu.base.results.colours import chip_colour, css
+from gfimu.visual.colours import PAGE
 from gfimu.visual.page import STILL_POLICY, page_plots, page_style
 from gfimu.visual.page.packed import Packed
 

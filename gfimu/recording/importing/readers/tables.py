@@ -13,11 +13,11 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from gfimu.base.errors import InputError
-from gfimu.base.files.input_file import parsing
 from gfimu.base.files.memory import MemoryLimit, MemoryLimitError
 from gfimu.recording.importing.column_map import TextSpec
 from gfimu.recording.importing.raw_table import RawFile, RawTable
 from gfimu.recording.importing.readers.text import GROWS, table_of_text
+from gfimu.recording.reading import parsing
 from gfimu.recording.tables.arrow import as_found
 from gfimu.recording.tables.column_file import open_parquet
 from gfimu.recording.tables.table_columns import TableColumns

@@ -13,9 +13,10 @@ from pathlib import Path
 import pytest
 
 from gfimu.base.errors import InputError
-from gfimu.base.files.input_file import check_input, is_ordinary, parsing, read_bytes, unpacked
+from gfimu.base.files.input_file import check_input, is_ordinary
 from gfimu.base.files.memory import MemoryLimit
 from gfimu.base.files.model_files import parse_toml
+from gfimu.recording.reading import parsing, read_bytes, unpacked
 
 
 def test_ordinary_files_only(tmp_path):

@@ -9,7 +9,7 @@ import pyarrow as pa
 import pytest
 from headless_browser import headless_browser
 
-from gfimu.base.results.colours import PAGE
+from gfimu.visual.colours import PAGE
 from sim.trials.sweep.design import Design
 from sim.trials.sweep.picture import campaign_picture
 from sim.trials.sweep.plan import load_plan
