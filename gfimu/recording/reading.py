@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import json
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
+from typing import Any
 
-from gfimu.base.errors import GfimuError, InputError
-from gfimu.base.files.input_file import check_input
+from gfimu.base.errors import GfimuError, InputError, system_errors
+from gfimu.base.files.input_file import LARGEST_TEXT, check_input
 from gfimu.base.files.memory import MemoryLimit
 
-__all__ = ["LONGEST_LINE", "MOST_COLUMNS", "parsing", "read_bytes", "unpacked"]
+__all__ = ["LONGEST_LINE", "MOST_COLUMNS", "parsing", "read_bytes", "read_json", "unpacked"]
 
 LONGEST_LINE = 2_000_000
 """Numerical: characters of a line, far more than a recording's metadata or samples need."""
@@ -21,6 +23,23 @@ MOST_COLUMNS = 20_000
 
 _GZIP = b"\x1f\x8b"
 _LONGEST_REASON = 120
+
+
+def read_json(path: str | Path, otherwise: str) -> Any:
+    """Return the content of a JSON file.
+
+    Raises
+    ------
+    InputError
+        If it can't be read, or is not JSON: then the message is ``otherwise``.
+    """
+    file = check_input(path, largest=LARGEST_TEXT)
+    with system_errors(file):
+        content = file.read_bytes()
+    try:
+        return json.loads(content.decode("utf-8"))
+    except (ValueError, RecursionError):  # also of whole numbers with thousands of digits
+        raise InputError(f"{file}: {otherwise}") from None
 
 
 def read_bytes(path: str | Path, *, grows: float = 1.0) -> bytes:
@@ -40,11 +59,9 @@ def read_bytes(path: str | Path, *, grows: float = 1.0) -> bytes:
     """
     file = check_input(path)
     limit = MemoryLimit.of(file)
-    try:
+    with system_errors(file):
         limit.needs(grows * file.stat().st_size)
         data = file.read_bytes()
-    except OSError as error:
-        raise InputError(f"{file}: {error.strerror or error}; check the path") from None
     if not data.startswith(_GZIP):
         return data
     return unpacked(data, limit, grows=grows)

@@ -12,7 +12,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from gfimu.base.errors import GfimuError, InputError
+from gfimu.base.errors import GfimuError, InputError, system_errors
 
 __all__ = [
     "check_display",
@@ -46,12 +46,10 @@ def open_viewer(path: str | Path) -> None:
         If this machine has no display, or the viewer fails; the message says what to do instead.
     """
     file = Path(path)
-    try:
-        with file.open("rb") as stream:
-            if stream.read(3) != b"RRF":
-                raise InputError(f"{file}: not a rerun recording; give a .rrd file that gfimu wrote")
-    except OSError as error:
-        raise InputError(f"{file}: {error.strerror or error}; check the path") from None
+    with system_errors(file), file.open("rb") as stream:
+        magic = stream.read(3)
+    if magic != b"RRF":
+        raise InputError(f"{file}: not a rerun recording; give a .rrd file that gfimu wrote")
     if not has_display():
         raise GfimuError(
             f"no display here to open {file}; run `{WEB_VIEWER} {file}` and open the address it prints in a "

@@ -7,12 +7,13 @@ import os
 import stat
 from pathlib import Path
 
-from gfimu.base.errors import InputError
+from gfimu.base.errors import InputError, system_errors
 
 __all__ = [
     "LARGEST_TEXT",
     "as_path",
     "check_input",
+    "first_bytes",
     "is_ordinary",
     "is_there",
 ]
@@ -50,6 +51,13 @@ def check_input(path: str | Path, *, largest: float = math.inf) -> Path:
     if stated.st_size > largest:
         raise InputError(f"{_short(file)}: has more than {largest / 1e6:g} MB, as no such file has; give another")
     return file
+
+
+def first_bytes(path: str | Path, count: int) -> bytes:
+    """Return so many bytes of the begin of a file; raises `InputError` as `check_input`."""
+    file = check_input(path)
+    with system_errors(file), file.open("rb") as stream:
+        return stream.read(count)
 
 
 def is_ordinary(path: str | Path) -> bool:

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from gfimu.base.errors import InputError, unknown_name
+from gfimu.base.errors import InputError, system_errors, unknown_name
 from gfimu.base.files.input_file import LARGEST_TEXT, check_input, is_ordinary
 
 __all__ = [
@@ -84,11 +84,10 @@ def read_toml(path: Path) -> dict[str, Any]:
     """Read a TOML file; a syntax error or unreadable file becomes an `InputError` that names it."""
     check_input(path, largest=LARGEST_TEXT)
     try:
-        text = path.read_text(encoding="utf-8")
+        with system_errors(path):
+            text = path.read_text(encoding="utf-8")
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: not valid TOML ({error}); correct the file") from None
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror or error}; check the path") from None
     return parse_toml(text, path)
 
 

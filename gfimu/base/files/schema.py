@@ -226,7 +226,10 @@ def _explained(message: str, data: Any, kind: type[Table], source: str) -> Input
     for number, step in enumerate(steps, start=1):
         at.step(step[1] or "", step[2] or "", bool(of_table) or number < len(steps))
     if of_table and of_table[1] == "contains unknown":
-        return InputError(f"{at.where}: {_unknown(of_table[2], _valid_keys(at.table()))}")
+        key, table = of_table[2], at.table()
+        tag = {table.tag_field} if table and table.tag_field else set()
+        valid = sorted({one.name for one in table.fields} | tag) if table else []
+        return InputError(f"{at.where}: unknown key {key!r}; valid: {', '.join(valid)}{_nearest(key, valid)}")
     if of_table:
         return InputError(f"{at.where}: {_missing(of_table[2], at.of_key(of_table[2]))}")
     if isinstance(at.key_value, Sequence) and not at.key_value and _is_list_of_tables(at.key_info):
@@ -234,16 +237,6 @@ def _explained(message: str, data: Any, kind: type[Table], source: str) -> Input
     finite = isinstance(at.key_value, int) or (isinstance(at.key_value, float) and math.isfinite(at.key_value))
     must_be = SIZES if reason == "size" and finite else _must_be(at)
     return InputError(f"{at.where}: {at.key} = {_short(at.key_value)} must be {must_be}")
-
-
-def _valid_keys(table: types.StructType | None) -> list[str]:
-    if table is None:
-        return []
-    return sorted({one.name for one in table.fields} | ({table.tag_field} if table.tag_field else set()))
-
-
-def _unknown(key: str, valid: Sequence[str]) -> str:
-    return f"unknown key {key!r}; valid: {', '.join(valid)}{_nearest(key, valid)}"
 
 
 def _nearest(word: Any, valid: Sequence[Any]) -> str:

@@ -22,6 +22,7 @@ _WIDTH, _HEIGHT = 7.0, 2.7  # inches of one panel
 _LONGEST_LEGEND = 12
 _MOST_POINTS = 20_000  # of a line; more can't be seen and make a slow picture
 _MANY_NAMES = 7  # under a panel, from which they are turned
+_UNSTAMPED = {"svg": {"Date": None}, "png": {"Software": None}}  # the same figure gives the same file
 _STYLES = {"line": "-", "dashes": "--", "dots": ":", "points": "."}
 
 
@@ -48,8 +49,9 @@ def write_panels(path: str | Path, title: str, panels: Sequence[Panel]) -> None:
 
 def save_figure(path: str | Path, figure: Any, dpi: int = 120) -> None:
     """Write a figure, whole or not at all; the extension decides the format, PNG without one."""
+    kind = Path(path).suffix.lstrip(".").lower() or "png"
     with atomic_path(path) as temporary:
-        figure.savefig(temporary, dpi=dpi, format=Path(path).suffix.lstrip(".") or "png")
+        figure.savefig(temporary, dpi=dpi, format=kind, metadata=_UNSTAMPED.get(kind))
 
 
 def _across_and_down(panels: Sequence[Panel]) -> tuple[int, int]:
