@@ -4,14 +4,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 
-__all__ = [
-    "LARGEST",
-    "MILLI_G",
-    "SIZES",
-    "STANDARD_GRAVITY",
-    "duration_text",
-    "is_usable",
-]
+__all__ = ["LARGEST", "MILLI_G", "SIZES", "STANDARD_GRAVITY", "duration_text", "is_usable"]
 
 STANDARD_GRAVITY = 9.80665
 """Standard gravity, m/s²."""

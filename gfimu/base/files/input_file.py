@@ -9,14 +9,7 @@ from pathlib import Path
 
 from gfimu.base.errors import InputError, system_errors
 
-__all__ = [
-    "LARGEST_TEXT",
-    "as_path",
-    "check_input",
-    "first_bytes",
-    "is_ordinary",
-    "is_there",
-]
+__all__ = ["LARGEST_TEXT", "as_path", "check_input", "first_bytes", "is_ordinary", "is_there"]
 
 LARGEST_TEXT = 20_000_000
 """Numerical: bytes of a TOML file, or of a calibration as JSON; in memory they may take 25 times as much."""

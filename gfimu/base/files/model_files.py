@@ -12,14 +12,7 @@ from typing import Any
 from gfimu.base.errors import InputError, system_errors, unknown_name
 from gfimu.base.files.input_file import LARGEST_TEXT, check_input, is_ordinary
 
-__all__ = [
-    "find_model",
-    "list_models",
-    "models_directory",
-    "parse_toml",
-    "read_toml",
-    "set_key",
-]
+__all__ = ["find_model", "list_models", "models_directory", "parse_toml", "read_toml", "set_key"]
 
 _LONGEST_REASON = 160
 _MOST_PARTS = 100  # numerical: of a dotted key

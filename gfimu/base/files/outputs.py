@@ -15,16 +15,7 @@ from pathlib import Path
 from gfimu.base.errors import InputError
 from gfimu.base.optional_packages import require
 
-__all__ = [
-    "RECORDING",
-    "RERUN",
-    "Output",
-    "OutputFile",
-    "OutputFolder",
-    "check_outputs",
-    "check_parent",
-    "same_file",
-]
+__all__ = ["RECORDING", "RERUN", "Output", "OutputFile", "OutputFolder", "check_outputs", "check_parent", "same_file"]
 
 
 @dataclass(frozen=True)

@@ -14,10 +14,7 @@ if TYPE_CHECKING:
     import rerun as rr
     import rerun.blueprint as rrb
 
-__all__ = [
-    "markdown",
-    "rrd_stream",
-]
+__all__ = ["markdown", "rrd_stream"]
 
 
 @contextmanager

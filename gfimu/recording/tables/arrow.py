@@ -13,15 +13,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-__all__ = [
-    "ArrowStream",
-    "arrow_column",
-    "as_found",
-    "column_type",
-    "from_json",
-    "metadata_of_schema",
-    "numbers",
-]
+__all__ = ["ArrowStream", "arrow_column", "as_found", "column_type", "from_json", "metadata_of_schema", "numbers"]
 
 _FOREIGN_METADATA = {"ARROW:schema", "pandas"}
 _PANDAS_ATTRS = "PANDAS_ATTRS"
