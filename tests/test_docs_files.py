@@ -7,10 +7,8 @@ import sys
 import pytest
 from every_item import every
 
-from gfimu.base.files.model_files import find_model
-from gfimu.commands.file_kinds import FILE_KINDS, file_schema
-
-OWN = [kind for kind in FILE_KINDS if kind != "map"]  # the map's schema has no units of its own
+KINDS = ("array", "part", "map", "twin", "scenario", "frame", "stage", "plan", "brief")
+OWN = [kind for kind in KINDS if kind != "map"]  # the map's schema has no units of its own
 SUFFIXES = {
     "m": "m",
     "s": "s",
@@ -48,15 +46,19 @@ def test_the_published_schemas_are_the_present_ones(script):
     assert published == script.schema_files(), REMEDY
 
 
+def test_every_kind_is_checked(script):
+    assert list(script.FILE_KINDS) == list(KINDS)
+
+
 def rows(script, kind):
-    return [(table.heading, row) for table in script.table_rows(file_schema(kind)) for row in table.keys]
+    return [(table.heading, row) for table in script.table_rows(script.file_schema(kind)) for row in table.keys]
 
 
-@every("kind", FILE_KINDS)
+@every("kind", KINDS)
 def test_every_key_has_a_meaning_and_a_type(script, kind):
     assert all(row.meaning.endswith(".") or kind == "map" for _, row in rows(script, kind))
     assert all(row.meaning and row.kind and row.default for _, row in rows(script, kind))
-    assert all(table.text for table in script.table_rows(file_schema(kind)))
+    assert all(table.text for table in script.table_rows(script.file_schema(kind)))
 
 
 @every("kind", OWN)
@@ -71,10 +73,10 @@ def test_the_unit_of_a_key_is_its_ending(script, kind):
             assert row.unit == "", row
 
 
-@every("kind", FILE_KINDS)
-def test_a_template_shows_every_key_of_the_schema(script, kind):
+@every("kind", KINDS)
+def test_a_template_shows_every_key_of_the_schema(script, project_root, kind):
     """The kinds of motion that the template does not use are on the page alone."""
-    text = find_model("templates", kind).read_text(encoding="utf-8")
+    text = (project_root / "models" / "templates" / f"{kind}.toml").read_text(encoding="utf-8")
     shown = {row.name for heading, row in rows(script, kind) if "with `kind" not in heading or '"profile"' in heading}
     assert {name for name in shown - {"source"} if not re.search(rf"\b{name}\b", text)} == set()
 

@@ -1,4 +1,4 @@
-"""The colours of every picture: one module owns them, so that the same quantity has the same colour everywhere.
+"""The colours of pictures on paper and of chips, so that the same quantity has the same colour everywhere.
 
 Chips take one hue each, in any number: hue and lightness in OKLCH (B. Ottosson, 2020), a space whose steps look alike,
 with the hue turned by the golden angle from chip to chip. A chip's hue follows from its number alone, so it is the same
@@ -6,7 +6,7 @@ in each picture, and neighbours in number are far apart in hue. The sensing axes
 
 Body axes follow the field's convention (x red, y green, z blue). What was before is orange and what came after is blue
 (vermilion and blue of M. Okabe and K. Ito, 2008, on paper). The colours of one picture stay apart for the
-colour-blind; the tests simulate their vision.
+colour-blind; the tests simulate their vision. Those of the viewer and of HTML pages are in `gfimu.visual.colours`.
 """
 
 from __future__ import annotations
