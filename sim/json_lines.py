@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from gfimu.base.errors import InputError
+from gfimu.base.errors import InputError, system_errors
 from gfimu.base.files.atomic_file import atomic_path
 from gfimu.base.files.input_file import is_ordinary
 
@@ -35,10 +35,8 @@ def read_lines(path: str | Path, remedy: str) -> list[bytes]:
     file = Path(path)
     if not is_ordinary(file):
         raise InputError(f"{file}: no such file; {remedy}")
-    try:
+    with system_errors(file, remedy):
         content = file.read_bytes()
-    except OSError as error:
-        raise InputError(f"{file}: {error.strerror or error}; {remedy}") from None
     if file.suffix != _PACKED:
         return content.splitlines()
     unpacker = lzma.LZMADecompressor()

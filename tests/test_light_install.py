@@ -20,11 +20,8 @@ DRAWING = {
     "matplotlib": {
         "gfimu/array_search/pictures.py",
         "gfimu/calibration/pictures.py",
-        "gfimu/motion/impact/picture.py",
         "gfimu/diagnosis/report/channel_tables.py",
         "gfimu/diagnosis/report/figures.py",
-        "gfimu/budget/drift/pictures.py",
-        "gfimu/sensor_noise/pictures.py",
         "gfimu/budget/tolerances/picture.py",
         "gfimu/visual/page/svg.py",
         "gfimu/visual/rig/figure.py",

@@ -9,9 +9,9 @@ from effect_formulas import BY_CHANCE, TOLERANCE, to_latex, vectors_of
 from effect_trials import simulate_command, twin_of
 
 from gfimu.array.array import AccelerometerArray
-from gfimu.base.units import NAME, NUMBER, RATIO
 from gfimu.diagnosis.design.proposal import SEPARATED
 from gfimu.diagnosis.policy import Policy
+from gfimu.model.parameter_units import NAME, NUMBER, RATIO
 from sim.effects import BODY_EFFECTS, CARRIAGE_EFFECTS, FURTHER_EFFECTS, TABLE_EFFECTS
 from sim.effects.base import Effect
 from sim.effects.catalogue import PLACES, every_effect, place_of

@@ -24,7 +24,7 @@ from effect_pages import page
 from effect_signatures import draw, signature
 from effect_trials import trial
 
-from gfimu.base.files.model_files import EFFECT_CATALOGUE, effect_catalogue
+from gfimu.model.effect_catalogue import EFFECT_CATALOGUE, effect_catalogue
 from sim.effects import added_effects
 from sim.effects.base import Effect
 from sim.effects.catalogue import every_effect

@@ -9,7 +9,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from gfimu.base.files.schema_keys import TableRows, json_schema, table_rows
+from file_tables import TableRows, table_rows
+
+from gfimu.base.files.schema import json_schema
 from gfimu.calibration.certificate.schema import SCHEMA_FILE, certificate_schema
 from gfimu.commands.file_kinds import FILE_KINDS, file_schema
 

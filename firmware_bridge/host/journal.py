@@ -20,7 +20,7 @@ import pyarrow.csv as pa_csv
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from gfimu.base.errors import GfimuError, InputError
+from gfimu.base.errors import GfimuError, InputError, system_errors
 from gfimu.base.files.atomic_file import atomic_path
 
 __all__ = ["Journal", "JournalError"]
@@ -67,11 +67,9 @@ class Journal:
         self.columns = ["t_s", *(f"{channel}_lsb" for channel in channels), "status"]
         self.columns += [_TEMPERATURE] if has_temperature else []
         lines = [f"# {key}: {json.dumps(value)}\n" for key, value in metadata.items()]
-        try:
+        with system_errors(path, "choose a file that can be written"):
             flags = os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_APPEND | getattr(os, "O_BINARY", 0)
             self._file = os.open(self.path, flags, 0o666)
-        except OSError as error:
-            raise InputError(f"{path}: {error.strerror or error}; choose a file that can be written") from None
         self._metadata = dict(metadata)
         self._header = ",".join(self.columns) + "\n"
         self._header_lines = len(lines) + 1

@@ -19,7 +19,8 @@ from firmware_bridge.host.recorder import Batch
 from firmware_bridge.host.stream_meter import GroupMeans, StreamMeter
 from gfimu.array.array import AccelerometerArray
 from gfimu.base.errors import GfimuError
-from gfimu.base.files.rerun_stream import rrd_stream, viewer_listens, viewer_stream
+from gfimu.base.files.rerun_stream import rrd_stream
+from gfimu.visual.viewer import viewer_listens, viewer_stream
 
 if TYPE_CHECKING:  # imported by the view's own thread: that takes longer than a recording should wait
     from gfimu.rate.health.fault import ChannelFault

@@ -15,7 +15,7 @@ from firmware_bridge.frames.decoder import LPC1768_DTYPE, FrameType, SampleDecod
 from firmware_bridge.loop.board_process import BoardProcess
 from firmware_bridge.loop.physics import Conversions
 from gfimu.base.declared import Declared, Table, cell, figure
-from gfimu.base.results import TableResult, text_column
+from gfimu.base.results import TableResult, columns_of, text_column
 
 __all__ = ["FAULTS", "FaultOutcome", "FaultReport", "resample_line", "run_campaign", "run_fault"]
 
@@ -82,14 +82,10 @@ class FaultReport(Declared, TableResult):
 
     def to_columns(self) -> dict[str, NDArray[Any]]:
         """Return one row per fault: frames, what the decoder reports, whether the host took no fault for data."""
-        counts = {key: [getattr(one, key) for one in self] for key in ("frames_whole", "frames_decoded", "invented")}
-        counts |= {key: [getattr(one.counts, key) for one in self] for key in ("lost", "corrupt", "restarts")}
-        return {
-            "fault": text_column(one.fault for one in self),
-            **{name: np.array(values, dtype=int) for name, values in counts.items()},
-            "reported": text_column(", ".join(one.reported) for one in self),
-            "passed": np.array([one.passed for one in self], dtype=bool),
-        }
+        counted = columns_of((outcome.counts for outcome in self), "lost corrupt restarts")
+        reported = {"reported": text_column(", ".join(outcome.reported) for outcome in self)}
+        frames = columns_of(self, "fault frames_whole frames_decoded invented")
+        return frames | counted | reported | columns_of(self, "passed")
 
     def _heading(self) -> str:
         return "Faults and what the host makes of them"

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from firmware_bridge.frames.commands import Command, encode_command, sample_at, set_rate
@@ -16,7 +15,7 @@ from firmware_bridge.loop.board_process import BoardProcess, require_emulator
 from firmware_bridge.lpc1768.build import check_image
 from gfimu.base.declared import Declared, Table, figure, table
 from gfimu.base.optional_packages import missing
-from gfimu.base.results import TableResult, text_column
+from gfimu.base.results import TableResult, columns_of
 
 __all__ = ["SelfTestReport", "SelfTestRow", "run_selftest"]
 
@@ -62,11 +61,7 @@ class SelfTestReport(Declared, TableResult):
 
     def to_columns(self) -> dict[str, NDArray[Any]]:
         """Return one row per check: whether it passed, and what was measured."""
-        return {
-            "check": text_column(row.check for row in self),
-            "passed": np.array([row.passed for row in self], dtype=bool),
-            "measured": text_column(row.measured for row in self),
-        }
+        return columns_of(self, "check passed measured")
 
     def _heading(self) -> str:
         return "Self-test of the emulator and the firmware"

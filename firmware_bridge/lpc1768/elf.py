@@ -7,7 +7,7 @@ import struct
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from gfimu.base.errors import InputError
+from gfimu.base.errors import InputError, system_errors
 
 __all__ = ["ElfImage", "Segment"]
 
@@ -69,10 +69,8 @@ class ElfImage:
             If the file is missing or no 32-bit ARM image.
         """
         file = Path(path)
-        try:
+        with system_errors(file, "give an ELF file or a raw .bin image"):
             content = file.read_bytes()
-        except OSError as error:
-            raise InputError(f"{file}: {error.strerror or error}; give an ELF file or a raw .bin image") from None
         if file.suffix == ".bin" and len(content) >= 8:
             return cls(str(file), (Segment(0, content, 0),), {}, (len(content), 0, 0))
         return cls.parse(content, str(file))

@@ -8,7 +8,6 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from firmware_bridge.loop.board_process import require_emulator
@@ -17,7 +16,7 @@ from firmware_bridge.strict.image import load_image
 from gfimu.base.child_process import run_module
 from gfimu.base.declared import Declared, Line, Table, figure
 from gfimu.base.errors import GfimuError, InputError
-from gfimu.base.results import TableResult, text_column
+from gfimu.base.results import TableResult, columns_of, text_column
 
 __all__ = ["CheckOptions", "CheckReport", "check_image"]
 
@@ -99,17 +98,9 @@ class CheckReport(Declared, TableResult):
 
     def to_columns(self) -> dict[str, NDArray[Any]]:
         """Return one row per finding: rule, severity, where, how often, what to do, and the document that says so."""
-        texts = {
-            key: text_column(getattr(finding, key) for finding in self.findings)
-            for key in ("rule", "severity", "what", "symbol", "remedy", "source")
-        }
-        return {
-            **{key: texts.pop(key) for key in ("rule", "severity")},
-            "count": np.array([one.count for one in self.findings], dtype=int),
-            "time_s": np.array([one.time_s for one in self.findings], dtype=float),
-            "pc": text_column(f"{one.pc:#x}" for one in self.findings),
-            **texts,
-        }
+        places = {"pc": text_column(f"{finding.pc:#x}" for finding in self.findings)}
+        what = columns_of(self.findings, "what symbol remedy source")
+        return columns_of(self.findings, "rule severity count time_s") | places | what
 
     def _heading(self) -> str:
         return f"{self.image} on the strict board"

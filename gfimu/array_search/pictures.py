@@ -14,13 +14,14 @@ from gfimu.array.array import AccelerometerArray
 from gfimu.array_search.front import CHIPS, Front
 from gfimu.array_search.problem import Problem, Sites
 from gfimu.array_search.shapes import Shape
-from gfimu.base.files.atomic_file import atomic_path
+from gfimu.base.results import save_figure
 from gfimu.base.results.colours import AFTER_ON_PAPER, BEFORE_ON_PAPER, INK, NOISE_ON_PAPER, PALE, chip_colour, css
 
 __all__ = ["array_picture", "front_picture"]
 
 _ARROW = 0.32  # of half the longest edge: length of a sensing axis
 _MM = 1e3
+_DPI = 130
 
 
 def front_picture(path: str | Path, front: Front) -> None:
@@ -50,7 +51,7 @@ def front_picture(path: str | Path, front: Front) -> None:
     axes.margins(0.08)
     axes.grid(lw=0.3)
     axes.legend(fontsize=8)
-    _save(figure, path)
+    save_figure(path, figure, _DPI)
 
 
 def array_picture(path: str | Path, array: AccelerometerArray, problem: Problem) -> None:
@@ -92,7 +93,7 @@ def array_picture(path: str | Path, array: AccelerometerArray, problem: Problem)
     axes.set_title(f"{array.name}: {len(array.chips)} chips, {_axes(problem)} each", fontsize=10)
     if problem.keep_out or isinstance(volume, Sites):
         axes.legend(fontsize=8, loc="upper left")
-    _save(figure, path)
+    save_figure(path, figure, _DPI)
 
 
 def _axes(problem: Problem) -> str:
@@ -134,8 +135,3 @@ def _draw_zone(
     for index, line in enumerate(_wires(zone)):
         within = np.clip(line * _MM, *shown)
         axes.plot(*within.T, color=css(BEFORE_ON_PAPER), lw=0.7, label=label if index == 0 else None)
-
-
-def _save(figure: Figure, path: str | Path) -> None:
-    with atomic_path(path) as temporary:
-        figure.savefig(temporary, dpi=130, format=Path(path).suffix.lstrip(".") or "png")

@@ -25,15 +25,7 @@ from gfimu.base.short_repr import short_repr
 from gfimu.rate.bounds.sample import rate_bound
 from gfimu.rate.health.protection import FaultProtection
 
-__all__ = [
-    "DEFAULT_NOISE_STD",
-    "Score",
-    "gdop",
-    "gdop_lower_bound",
-    "ranking_remark",
-    "score",
-    "score_panels",
-]
+__all__ = ["DEFAULT_NOISE_STD", "Score", "gdop", "gdop_lower_bound", "ranking_remark", "score", "score_panels"]
 
 DEFAULT_NOISE_STD = 0.0287
 """Channel noise at which rate bounds are quoted, m/s²: ADXL345, x and y axes at 100 Hz (0.75 LSB of 3.9 mg)."""

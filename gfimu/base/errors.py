@@ -24,6 +24,7 @@ __all__ = [
     "nearest_name",
     "one_line",
     "printable",
+    "system_errors",
     "unknown_name",
 ]
 
@@ -118,6 +119,15 @@ def naming(source: str) -> Iterator[None]:
         if not source or source in str(error):
             raise
         raise type(error)(f"{source}: {error}") from None
+
+
+@contextmanager
+def system_errors(source: object, remedy: str = "check the path") -> Iterator[None]:
+    """Turn an error of the system on a file or port into an `InputError` of one line with the remedy."""
+    try:
+        yield
+    except OSError as error:
+        raise InputError(f"{source}: {error.strerror or error}; {remedy}") from None
 
 
 def unknown_name(kind: str, name: str, valid: Iterable[str]) -> InputError:

@@ -7,14 +7,12 @@ from dataclasses import fields
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-__all__ = ["joined", "short_repr", "timing"]
+__all__ = ["joined", "short_repr"]
 
 _LONGEST = 200
 _LONGEST_TEXT = 40
 _FEW = 3
-_GAP = 1.5  # sample periods, as `gfimu.Recording.gaps`
 
 
 def short_repr(result: Any) -> str:
@@ -34,19 +32,6 @@ def joined(result: object, parts: list[str]) -> str:
     """Return ``Class(part, part)``, cut where it would flood a line."""
     text = ", ".join(part for part in parts if part)
     return f"{type(result).__name__}({text if len(text) <= _LONGEST else f'{text[: _LONGEST - 1]}…'})"
-
-
-def timing(t_s: NDArray[np.float64]) -> str:
-    """Return samples, length, rate and gaps of sample times (n,), s, in words."""
-    count = f"{len(t_s)} samples" if len(t_s) != 1 else "1 sample"
-    if len(t_s) < 2:
-        return count
-    steps = np.diff(t_s)
-    period = float(np.median(steps))
-    gaps = int(np.count_nonzero(steps > _GAP * period))
-    rate = f" at {1.0 / period:.4g} Hz" if period > 0 else ""
-    gap_text = f", {gaps} gap{'s' if gaps > 1 else ''}" if gaps else ""
-    return f"{count}, {float(t_s[-1] - t_s[0]):.4g} s{rate}{gap_text}"
 
 
 def _short(value: Any) -> str:

@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from gfimu.base.errors import InputError
-from gfimu.base.files.input_file import as_path, read_bytes
+from gfimu.base.files.input_file import as_path
 from gfimu.recording import Recording
+from gfimu.recording.reading import read_bytes
 
 __all__ = ["read_text_triad"]
 

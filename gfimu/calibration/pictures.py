@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.base.files.atomic_file import atomic_path
+from gfimu.base.results import save_figure
 from gfimu.base.results.colours import AFTER_ON_PAPER, BEFORE_ON_PAPER, DIVERGING, INK, chip_colour, css
 from gfimu.calibration.check_poses import rest_means
 from gfimu.calibration.result import Calibration
@@ -44,9 +44,7 @@ _KINDS = {
 
 def calibration_picture(path: str | Path, calibration: Calibration, recording: Recording | None = None) -> None:
     """Write the picture of a calibration, as `calibration_figure` draws it; the extension decides the format."""
-    figure = calibration_figure(calibration, recording)
-    with atomic_path(path) as temporary:
-        figure.savefig(temporary, dpi=120, format=Path(path).suffix.lstrip(".") or "png")
+    save_figure(path, calibration_figure(calibration, recording))
 
 
 def calibration_figure(calibration: Calibration, recording: Recording | None = None) -> Figure:

@@ -21,7 +21,6 @@ from scipy.spatial.transform import Rotation
 from gfimu.array.gravity import EARTH_RATE
 from gfimu.array.integration import integrate_samples
 from gfimu.base.errors import InputError
-from gfimu.base.units import GYRO_COLUMNS
 from gfimu.calibration.error_model import free_elements
 from gfimu.calibration.fit_quality import covariance_scale
 from gfimu.calibration.known_poses import forward_design
@@ -30,6 +29,7 @@ from gfimu.calibration.parameter_names import parameter_names
 from gfimu.calibration.result import Calibration
 from gfimu.recording import Recording
 from gfimu.recording.importing.guessing.likely_reference import reference_remedy
+from gfimu.recording.quantities import GYRO_COLUMNS
 from gfimu.recording.rest import detect_rest, mean_variance_factor
 from gfimu.recording.timing.reference_times import reference_on_rows
 

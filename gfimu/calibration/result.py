@@ -20,10 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.array.array import AccelerometerArray
-from gfimu.base.declared import Declared, Matrix, Table, cell, figure, plain, table
+from gfimu.base.declared import Declared, Matrix, Table, cell, figure, table
 from gfimu.base.errors import InputError, UnitError
 from gfimu.base.files.atomic_file import write_text
-from gfimu.base.files.input_file import LARGEST_TEXT, check_input
 from gfimu.base.results import Panel, PlottedResult, Series
 from gfimu.base.short_repr import joined
 from gfimu.base.units import LARGEST
@@ -31,6 +30,7 @@ from gfimu.calibration.error_model import GAUGES, ErrorModel
 from gfimu.calibration.parameter_names import KINDS, cubic_names, kind_of, parameter_names, quadratic_names
 from gfimu.calibration.valid_covariance import require_covariance, require_finite
 from gfimu.recording import Recording
+from gfimu.recording.reading import read_json
 
 __all__ = ["FORMAT_VERSION", "Calibration", "CalibrationParameter", "load_calibration"]
 
@@ -386,7 +386,7 @@ class Calibration(Declared, PlottedResult):
 
     def save(self, path: str | Path) -> None:
         """Write the calibration as JSON, whole or not at all."""
-        write_text(path, json.dumps(plain(self.to_dict()), indent=1, allow_nan=False) + "\n")
+        write_text(path, json.dumps(self.to_dict(), indent=1, allow_nan=False) + "\n")
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], *, source: str = "calibration") -> Calibration:
@@ -463,11 +463,5 @@ def load_calibration(path: str | Path) -> Calibration:
     >>> import gfimu
     >>> gfimu.load_calibration("cal.json").apply(run)  # doctest: +SKIP
     """
-    file = check_input(path, largest=LARGEST_TEXT)
-    try:
-        data = json.loads(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"{file}: {error.strerror or error}; check the path") from None
-    except (ValueError, RecursionError):  # also of whole numbers with thousands of digits
-        raise InputError(f"{file}: not a calibration file; make one with `gfimu calibrate`") from None
-    return Calibration.from_dict(data, source=str(file))
+    data = read_json(path, "not a calibration file; make one with `gfimu calibrate`")
+    return Calibration.from_dict(data, source=str(path))

@@ -9,15 +9,15 @@ import numpy as np
 
 from gfimu.array.array import AccelerometerArray
 from gfimu.base.errors import InputError
-from gfimu.base.files.column_file import open_columns
 from gfimu.base.files.input_file import is_ordinary
-from gfimu.base.files.table import ArrowStream
 from gfimu.calibration.imu_tk import read_text_triad
 from gfimu.calibration.result import Calibration
 from gfimu.recording import Recording
 from gfimu.recording.carried_array import array_difference
 from gfimu.recording.formats import format_of_recording, open_run
 from gfimu.recording.mapped import MappedFile, mapped_reference
+from gfimu.recording.tables.arrow import ArrowStream
+from gfimu.recording.tables.column_file import open_columns
 
 __all__ = ["open_calibrated", "open_calibrated_run", "open_references", "open_uncalibrated"]
 

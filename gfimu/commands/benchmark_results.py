@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.base.declared import Declared, Table, figure, table
-from gfimu.base.results import TableResult, one_row, text_column
+from gfimu.base.results import TableResult, columns_of, one_row
 from sim.trials.benchmark.release import SetInfo
 
 __all__ = ["BenchmarkList", "BenchmarkRun", "BenchmarkWorlds"]
@@ -30,13 +29,7 @@ class BenchmarkList(Declared, TableResult):
 
     def to_columns(self) -> dict[str, NDArray[Any]]:
         """Return one row per set: name, worlds of each split, what it is, licence."""
-        return {
-            "name": text_column(one.name for one in self.sets),
-            "dev": np.array([one.dev for one in self.sets], dtype=int),
-            "test": np.array([one.test for one in self.sets], dtype=int),
-            "about": text_column(one.about for one in self.sets),
-            "licence": text_column(one.licence for one in self.sets),
-        }
+        return columns_of(self.sets, "name dev test about licence")
 
     def shown(self) -> Iterator[Table | str]:
         """Yield the table and the sentence that people read."""

@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from gfimu.base.errors import InputError
-from gfimu.base.files.outputs import CALIBRATION as CALIBRATION_FILE
 from gfimu.calibration.registry import METHODS
 from gfimu.commands.shell import completion
 from gfimu.commands.shell.declare import Group, Option, command
@@ -31,6 +30,7 @@ from gfimu.commands.shell.options import (
     PICTURE,
     REST_THRESHOLD,
 )
+from gfimu.commands.shell.output_files import CALIBRATION as CALIBRATION_FILE
 
 if TYPE_CHECKING:
     from gfimu.array.array import AccelerometerArray

@@ -25,10 +25,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from gfimu.base.errors import InputError
-from gfimu.base.files.outputs import EXPORT
 from gfimu.commands.shell.completion import words
 from gfimu.commands.shell.declare import Option, command
 from gfimu.commands.shell.options import ARRAY, MAP_OF_TABLE, MAX_MEMORY
+from gfimu.commands.shell.output_files import EXPORT
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

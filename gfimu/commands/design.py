@@ -12,10 +12,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from gfimu.base.errors import InputError
-from gfimu.base.files.outputs import SCENARIO
 from gfimu.commands.shell import completion
 from gfimu.commands.shell.declare import Option, command
 from gfimu.commands.shell.options import ALLOW_CODE, DURATION, MAP, MAX_MEMORY, PROGRESS, SEED, TWIN
+from gfimu.commands.shell.output_files import SCENARIO
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

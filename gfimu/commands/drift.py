@@ -120,9 +120,7 @@ def drift_of_rest(
     with naming(name_of(recording)):
         windows = rest_drift(run, geometry, time=duration, lead=lead, gravity=gravity)
     if picture is not None:
-        from gfimu.budget.drift.pictures import rest_drift_picture
-
-        rest_drift_picture(picture, windows)
+        windows.to_picture(picture)
     return windows
 
 

@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from gfimu.base.errors import GeometryError, InputError, naming
-from gfimu.base.files.outputs import ESTIMATE
 from gfimu.commands.known_axis import AXIS, AxisLike, as_known_axis
 from gfimu.commands.place import PLACE, Place
 from gfimu.commands.shell.completion import words
@@ -34,6 +33,7 @@ from gfimu.commands.shell.options import (
     RRD,
     UNKNOWN_START,
 )
+from gfimu.commands.shell.output_files import ESTIMATE
 from gfimu.rate.registry import RATE_METHODS, rate_method
 
 if TYPE_CHECKING:

@@ -13,10 +13,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, overload
 
 from gfimu.base.errors import InputError
-from gfimu.base.files.outputs import RECORDING, TRACE, OutputFolder
+from gfimu.base.files.outputs import RECORDING, OutputFolder
 from gfimu.base.optional_packages import require
 from gfimu.commands.shell.declare import Group, Option, command
 from gfimu.commands.shell.options import BAUD, CHIPS, DURATION, IMAGE, PORT, RANGE, RATE, SCENARIO, SEED, TIME_LIMIT
+from gfimu.commands.shell.output_files import TRACE
 
 if TYPE_CHECKING:
     from firmware_bridge.board.trace import TraceCounts

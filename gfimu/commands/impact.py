@@ -10,9 +10,10 @@ gfimu impact drop.csv --array nap.toml --cfc 180 --out drop_cfc180.csv --estimat
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from gfimu.base.files.outputs import ESTIMATE, RECORDING
+from gfimu.base.files.outputs import RECORDING
 from gfimu.commands.shell.declare import Option, command
 from gfimu.commands.shell.options import ARRAY, CALIBRATION, FORCE, MAP, MAX_MEMORY, PICTURE
+from gfimu.commands.shell.output_files import ESTIMATE
 
 if TYPE_CHECKING:
     from gfimu.array.array import AccelerometerArray
@@ -101,7 +102,5 @@ def impact(
     if estimate is not None:
         measured.motion.write(estimate)
     if picture is not None:
-        from gfimu.motion.impact.picture import impact_picture
-
-        impact_picture(picture, measured)
+        measured.to_picture(picture)
     return measured

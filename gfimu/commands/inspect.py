@@ -15,17 +15,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
 from gfimu.base.errors import InputError
-from gfimu.base.files.outputs import COLUMN_MAP
 from gfimu.commands.shell.declare import Option, command
 from gfimu.commands.shell.options import MAX_MEMORY, TABLE
+from gfimu.commands.shell.output_files import COLUMN_MAP
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from gfimu.base.files.memory import MemorySize
-    from gfimu.base.files.table import ArrowStream
     from gfimu.recording.importing import Inspection
     from gfimu.recording.mapped import RecordingLike
+    from gfimu.recording.tables.arrow import ArrowStream
 
 __all__ = ["inspect"]
 

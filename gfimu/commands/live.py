@@ -18,7 +18,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from gfimu.base.errors import InputError
+from gfimu.base.errors import InputError, system_errors
 from gfimu.commands.known_axis import AXIS_ALONE, AxisLike, as_known_axis
 from gfimu.commands.shell.declare import Option, command
 from gfimu.commands.shell.options import (
@@ -211,10 +211,8 @@ def _socket_lines(source: str, host: str, port: int) -> Iterator[str]:
 
     from gfimu.recording.lines import whole_lines
 
-    try:
+    with system_errors(f"--from {source!r}", "start the server first"):
         connection = socket.create_connection((host, port), timeout=10)
-    except OSError as error:
-        raise InputError(f"--from {source!r}: {error.strerror or error}; start the server first") from None
     connection.settimeout(None)
     with connection, connection.makefile("r", encoding="utf-8", errors="replace") as stream:
         yield from whole_lines(stream.readline, source)

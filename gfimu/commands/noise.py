@@ -13,7 +13,6 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from gfimu.base.files.outputs import KALIBR
 from gfimu.commands.known_axis import AXIS_PLACE, AxisLike, as_known_axis
 from gfimu.commands.shell.declare import Option, command
 from gfimu.commands.shell.options import (
@@ -26,6 +25,7 @@ from gfimu.commands.shell.options import (
     REST_THRESHOLD,
     SPEED_RAD_S,
 )
+from gfimu.commands.shell.output_files import KALIBR
 
 if TYPE_CHECKING:
     from gfimu.array.array import AccelerometerArray
@@ -120,7 +120,5 @@ def noise(
     if kalibr is not None:
         write_text(kalibr, kalibr_yaml(result))
     if picture is not None:
-        from gfimu.sensor_noise.pictures import noise_picture
-
-        noise_picture(picture, result)
+        result.to_picture(picture)
     return result

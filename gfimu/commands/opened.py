@@ -15,12 +15,12 @@ if TYPE_CHECKING:
 
     from gfimu.array.array import AccelerometerArray
     from gfimu.base.files.memory import MemorySize
-    from gfimu.base.files.table import ArrowStream
     from gfimu.calibration.result import Calibration
     from gfimu.model.world_model import WorldModel
     from gfimu.recording import Recording
     from gfimu.recording.importing import ColumnMap
     from gfimu.recording.mapped import MappedFile, RecordingLike
+    from gfimu.recording.tables.arrow import ArrowStream
 
 Source: TypeAlias = "Recording | str | Path | MappedFile | ArrowStream"
 """A recording, or what its readers take."""
@@ -163,7 +163,7 @@ def _of_table(
     array: AccelerometerArray | str | Path | None,
     column_map: ColumnMap | str | Path | None,
 ) -> Source:
-    from gfimu.base.files.table_columns import TableColumns
+    from gfimu.recording.tables.table_columns import TableColumns
 
     if column_map is None:
         return cast("Source", table if isinstance(table, TableColumns) else TableColumns(table))

@@ -15,10 +15,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from gfimu.base.errors import InputError
-from gfimu.base.files.outputs import ARRAY_FILE, OutputFolder
+from gfimu.base.files.outputs import OutputFolder
 from gfimu.commands.shell import completion
 from gfimu.commands.shell.declare import Option, command
 from gfimu.commands.shell.options import CHIPS, PICTURE, PROGRESS, SEED
+from gfimu.commands.shell.output_files import ARRAY_FILE
 
 if TYPE_CHECKING:
     import numpy as np

@@ -216,7 +216,7 @@ class _LateView:
         self._opened = False
         if live:
             require("--live", "rerun")
-            from gfimu.base.files.rerun_stream import check_display
+            from gfimu.visual.viewer import check_display
 
             check_display()
 
@@ -236,7 +236,7 @@ class _LateView:
             return
         picture = None
         if has_picture:
-            from gfimu.base.files.rerun_stream import quiet_sdk
+            from gfimu.visual.viewer import quiet_sdk
 
             quiet_sdk()
             from gfimu.visual.live import LivePicture

@@ -15,10 +15,10 @@ from typing import Annotated, Any
 
 from gfimu.base.declared import Declared, figure, struct_of, structs_of
 from gfimu.base.errors import unknown_name
-from gfimu.base.files.outputs import JSON_SCHEMA
 from gfimu.base.files.schema import about
 from gfimu.commands.shell.completion import beginning
 from gfimu.commands.shell.declare import Option, command
+from gfimu.commands.shell.output_files import JSON_SCHEMA
 
 __all__ = ["schema", "schema_names"]
 

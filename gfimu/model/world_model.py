@@ -215,7 +215,7 @@ class EffectFamily(Protocol):
         ...
 
     def parameter_units(self, array: AccelerometerArray) -> Mapping[str, str]:
-        """Return the unit of each parameter by key: a unit, or `gfimu.base.units.RATIO`, ``NUMBER`` or ``NAME``."""
+        """Return the unit of each parameter by key, or ``RATIO``, ``NUMBER`` or ``NAME`` of `parameter_units`."""
         ...
 
     def patterns(self, array: AccelerometerArray) -> tuple[Pattern, ...]:

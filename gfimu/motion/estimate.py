@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 
 from gfimu.array.array import OMEGA_PRODUCTS
 from gfimu.base.errors import InputError
-from gfimu.base.files.column_file import open_columns, write_columns
-from gfimu.base.files.table import ArrowStream
 from gfimu.base.results import Panel, PlottedResult, Series, axis_series
-from gfimu.base.short_repr import joined, timing
+from gfimu.base.short_repr import joined
 from gfimu.rate.result import undecided
+from gfimu.recording.sample_times import timing
+from gfimu.recording.tables.arrow import ArrowStream
+from gfimu.recording.tables.column_file import open_columns, write_columns
 
 __all__ = ["FORMAT_VERSION", "Estimate"]
 

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +26,7 @@ from scipy.special import chdtri
 
 from gfimu.array.array import AccelerometerArray
 from gfimu.array.parts.limits import PartLimits
-from gfimu.base.declared import Declared, figure, plain
+from gfimu.base.declared import Declared, figure
 from gfimu.base.errors import InputError
 from gfimu.rate.result import RateEstimate
 from gfimu.rate.sensing import ChannelTables, SensorErrors
@@ -74,10 +74,6 @@ class Consistency(Declared):
     false_alarm: Annotated[
         float, figure("Probability of calling a right model inconsistent, by each of the two tests.")
     ]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the figures by name, for JSON; None for those that are not known."""
-        return plain(super().to_dict())
 
 
 def judge_consistency(

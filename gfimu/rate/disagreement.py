@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from gfimu.base.compiled import compiled
-from gfimu.base.declared import Declared, figure, plain
+from gfimu.base.declared import Declared, figure
 from gfimu.base.short_repr import short_repr
 
 __all__ = [
@@ -258,10 +258,6 @@ class Disagreement(Declared):
     fast_times: Annotated[float, figure("Median of s̃ in the fastest third.")]
     slow_rad_s: Annotated[float, figure("Median rate of the slowest third.", "rad/s")]
     fast_rad_s: Annotated[float, figure("Median rate of the fastest third.", "rad/s")]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the figures by name, for JSON; None for those that are not known."""
-        return plain(super().to_dict())
 
     @classmethod
     def from_dict(cls, figures: Mapping[str, Any]) -> Disagreement:

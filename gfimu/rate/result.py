@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.base.results import Panel, PlottedResult, Series, axis_series
-from gfimu.base.short_repr import joined, timing
+from gfimu.base.short_repr import joined
+from gfimu.recording.sample_times import timing
 
 __all__ = ["DECIDED", "ChannelReport", "RateEstimate", "SignDecision", "clear_of_zero", "full_covariance", "undecided"]
 

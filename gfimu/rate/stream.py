@@ -17,12 +17,12 @@ from gfimu.array.parts.part import Part
 from gfimu.array.parts.plausible import largest_of_array
 from gfimu.base.declared import Declared, figure
 from gfimu.base.errors import InputError
-from gfimu.base.files.column_file import head_line
-from gfimu.base.units import GYRO_COLUMNS, READING_UNITS
 from gfimu.rate.kalman import FilterSettings
 from gfimu.rate.live import LiveRateFilter
 from gfimu.rate.result import ChannelReport, RateEstimate
 from gfimu.rate.sensing import SensorErrors
+from gfimu.recording.quantities import GYRO_COLUMNS, READING_UNITS
+from gfimu.recording.tables.column_file import head_line
 
 __all__ = [
     "LiveSample",

@@ -18,7 +18,7 @@ import numpy as np
 from gfimu.array.array import AccelerometerArray
 from gfimu.base.errors import InputError, RecordingWarning
 from gfimu.base.files.model_files import list_models, parse_toml
-from gfimu.base.units import READING_UNITS
+from gfimu.recording.quantities import READING_UNITS
 
 __all__ = [
     "array_difference",

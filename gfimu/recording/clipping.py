@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from gfimu.array.array import AccelerometerArray
-from gfimu.base.units import GYRO_COLUMNS
 from gfimu.recording.checks import Finding, noisy_channels
 from gfimu.recording.importing.oddities import rails_of
+from gfimu.recording.quantities import GYRO_COLUMNS
 from gfimu.recording.recording import Recording
 
 __all__ = ["without_clipped"]

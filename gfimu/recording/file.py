@@ -16,11 +16,12 @@ from gfimu.array.array import AccelerometerArray
 from gfimu.array.parts.part import Part
 from gfimu.array.parts.plausible import MOST_CORRUPT, largest_of_array, largest_of_part, largest_reference
 from gfimu.base.errors import CorruptValueWarning, InputError, UnitError
-from gfimu.base.files.column_file import ColumnFile, open_columns
-from gfimu.base.files.table import ArrowStream
-from gfimu.base.files.table_columns import TableColumns
-from gfimu.base.units import READING_UNITS, REFERENCE_UNITS, STANDARD_GRAVITY, TIME_COLUMNS, reference_quantity
+from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.recording.carried_array import carried_array
+from gfimu.recording.quantities import READING_UNITS, REFERENCE_UNITS, TIME_COLUMNS, reference_quantity
+from gfimu.recording.tables.arrow import ArrowStream
+from gfimu.recording.tables.column_file import ColumnFile, open_columns
+from gfimu.recording.tables.table_columns import TableColumns
 
 __all__ = ["RecordingContent", "read_recording_file"]
 
@@ -66,7 +67,7 @@ def read_recording_file(
     Parameters
     ----------
     path : str, Path or table
-        The file, or a table (see `gfimu.base.files.table_columns.TableColumns`).
+        The file, or a table (see `gfimu.recording.tables.table_columns.TableColumns`).
     array : AccelerometerArray or None
         The array whose channels must be there; None takes every channel found.
     unit : {"m_s2", "lsb"}

@@ -21,14 +21,15 @@ from numpy.typing import NDArray
 from gfimu.array.array import AccelerometerArray
 from gfimu.array.parts.plausible import rails_of_array
 from gfimu.base.errors import InputError, RecordingWarning
-from gfimu.base.files.column_file import ColumnFile, open_columns
-from gfimu.base.files.table import ArrowStream, schema_metadata
-from gfimu.base.files.table_columns import TableColumns
+from gfimu.base.files.metadata import schema_metadata
 from gfimu.recording.importing.clock import increasing_times
 from gfimu.recording.importing.column_map import ColumnMap, TimeSpec
 from gfimu.recording.importing.recognise import map_hint
 from gfimu.recording.mimu4444 import is_mimu4444, read_mimu4444
 from gfimu.recording.recording import Recording
+from gfimu.recording.tables.arrow import ArrowStream
+from gfimu.recording.tables.column_file import ColumnFile, open_columns
+from gfimu.recording.tables.table_columns import TableColumns
 
 __all__ = ["filtered_recording", "rows_between", "without_rows"]
 

@@ -10,16 +10,16 @@ from typing import cast
 
 from gfimu.array.array import AccelerometerArray
 from gfimu.base.errors import InputError
-from gfimu.base.files.column_file import ColumnFile, open_columns
 from gfimu.base.files.input_file import is_there
 from gfimu.base.files.memory import MemorySize, with_memory
-from gfimu.base.files.table import ArrowStream
 from gfimu.base.plugins import plugins
 from gfimu.recording.carried_array import carried_array, check_all_channels
 from gfimu.recording.importing.recognise import map_hint
 from gfimu.recording.mapped import MappedFile
 from gfimu.recording.mimu4444 import is_mimu4444, read_mimu4444
 from gfimu.recording.recording import Recording
+from gfimu.recording.tables.arrow import ArrowStream
+from gfimu.recording.tables.column_file import ColumnFile, open_columns
 
 __all__ = ["FORMATS", "RecordingFormat", "format_of_recording", "formats", "is_estimate", "open_recording", "open_run"]
 

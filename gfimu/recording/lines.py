@@ -13,7 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from gfimu.base.errors import InputError
-from gfimu.base.files.input_file import LONGEST_LINE, check_input
+from gfimu.base.files.input_file import check_input, first_bytes
+from gfimu.recording.reading import LONGEST_LINE
 from gfimu.recording.recording import Recording
 
 __all__ = ["recording_lines", "whole_lines"]
@@ -39,11 +40,7 @@ def recording_lines(path: str | Path, *, follow: bool = False) -> Iterator[str]:
         If the file can't be read.
     """
     file = check_input(path)
-    try:
-        with file.open("rb") as stream:
-            magic = stream.read(len(_PARQUET))
-    except OSError as error:
-        raise InputError(f"{file}: {error.strerror or error}; check the path") from None
+    magic = first_bytes(file, len(_PARQUET))
     return _finished(file) if magic == _PARQUET else _text(file, follow=follow)
 
 

@@ -17,8 +17,7 @@ from gfimu.array.array import AccelerometerArray
 from gfimu.base.errors import InputError, RecordingWarning
 from gfimu.base.files.input_file import as_path
 from gfimu.base.files.memory import MemorySize, with_memory
-from gfimu.base.files.table import ArrowStream, schema_metadata
-from gfimu.base.files.table_columns import TableColumns
+from gfimu.base.files.metadata import schema_metadata
 from gfimu.recording.carried_array import array_metadata
 from gfimu.recording.filtered import filtered_recording, rows_between, without_rows
 from gfimu.recording.importing.column_map import UNMAPPED, ColumnMap, load_map
@@ -26,6 +25,8 @@ from gfimu.recording.importing.piece import Piece, combined_file, merged_piece, 
 from gfimu.recording.importing.readers import read_foreign
 from gfimu.recording.importing.readers.tables import table_file
 from gfimu.recording.recording import Recording
+from gfimu.recording.tables.arrow import ArrowStream
+from gfimu.recording.tables.table_columns import TableColumns
 
 __all__ = ["MappedFile", "RecordingLike", "mapped_recording", "mapped_reference"]
 

@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 from gfimu.array.array import AccelerometerArray
 from gfimu.array.parts.part import Part
 from gfimu.base.errors import InputError
-from gfimu.base.files.input_file import as_path, is_ordinary, read_bytes
+from gfimu.base.files.input_file import as_path, is_ordinary
 from gfimu.recording.carried_array import array_metadata
+from gfimu.recording.reading import read_bytes
 from gfimu.recording.recording import Recording
 
 __all__ = ["is_mimu4444", "read_mimu4444"]

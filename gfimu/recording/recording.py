@@ -19,14 +19,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from gfimu.array.array import AccelerometerArray
 from gfimu.base.errors import InputError, UnitError
-from gfimu.base.files.column_file import write_columns
 from gfimu.base.files.memory import MemorySize, with_memory
-from gfimu.base.files.table import ArrowStream
-from gfimu.base.files.table_columns import TableColumns
 from gfimu.base.results import Panel, PlottedResult, Series, axis_series
-from gfimu.base.short_repr import joined, timing
+from gfimu.base.short_repr import joined
 from gfimu.recording.carried_array import array_metadata, carried_array, with_carried_array
 from gfimu.recording.file import read_recording_file
+from gfimu.recording.sample_times import timing
+from gfimu.recording.tables.arrow import ArrowStream
+from gfimu.recording.tables.column_file import write_columns
+from gfimu.recording.tables.table_columns import TableColumns
 
 __all__ = ["Recording"]
 

@@ -14,8 +14,8 @@ from gfimu.base.declared import Declared, Table, figure
 from gfimu.base.errors import InputError, unknown_name
 from gfimu.base.results import Panel, PlottedResult, Series, text_column
 from gfimu.base.short_repr import short_repr
-from gfimu.base.units import TIME_COLUMNS
 from gfimu.recording import Recording
+from gfimu.recording.quantities import TIME_COLUMNS
 from gfimu.recording.rest import detect_rest
 from gfimu.recording.timing.reference_times import reference_series
 from gfimu.sensor_noise.identification import TERMS, NoiseModel, identify_noise
@@ -26,6 +26,7 @@ STRETCHES = ("rest", "all")
 """Which samples to use: the longest rest without a gap, or everything up to the first gap."""
 
 
+_AXIS_STYLES = ("line", "dashes", "dots")  # of the lines of a chip's sensing axes, which have one hue
 _UNIT_WORDS = {"m_s2": "m/s²", "lsb": "counts"}
 
 
@@ -67,7 +68,7 @@ class RecordingNoise(Declared, PlottedResult):
         }
 
     def _heading(self) -> str:
-        return "Noise at rest"
+        return f"Noise at rest, {self.duration_s:.0f} s at {self.rate:.4g} Hz"
 
     def _panels(self) -> list[Panel]:
         groups = (
@@ -76,14 +77,19 @@ class RecordingNoise(Declared, PlottedResult):
         )
         panels = []
         for title, models, unit in groups:
-            stems = list(dict.fromkeys(name[:-1] for name in models))
-            series = tuple(
-                Series(name, model.allan.deviation, x=model.allan.tau, chip=stems.index(name[:-1]))
-                for name, model in models.items()
-            )
+            stems = [name[:-1] for name in models]
+            chips = list(dict.fromkeys(stems))
+            series: list[Series] = []
+            for place, ((name, model), stem) in enumerate(zip(models.items(), stems, strict=True)):
+                tau = np.geomspace(model.allan.tau[0], model.allan.tau[-1], 100)
+                chip, style = chips.index(stem), _AXIS_STYLES[stems[:place].count(stem) % 3]
+                series.append(Series("", model.allan.deviation, x=model.allan.tau, chip=chip, style="points"))
+                series.append(Series(name, model.deviation(tau), x=tau, chip=chip, style=style))
             if series:
                 label = f"Allan deviation, {unit}"
-                panels.append(Panel(f"{title} at rest", label, series, np.empty(0), "averaging time τ, s", scale="log"))
+                panels.append(
+                    Panel(f"{title} at rest", label, tuple(series), np.empty(0), "averaging time τ, s", scale="log")
+                )
         return panels
 
     def sample_std(self, channels: Sequence[str]) -> NDArray[np.float64]:

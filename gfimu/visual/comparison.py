@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from gfimu.array.array import AccelerometerArray
 from gfimu.base.errors import InputError
-from gfimu.base.results.colours import AFTER, BEFORE, MEASURED, Colour
+from gfimu.base.results.colours import Colour
 from gfimu.recording import Recording
+from gfimu.visual.colours import AFTER, BEFORE, MEASURED
 from gfimu.visual.motion import KnownMotion
 from gfimu.visual.plots import Line, Plot
 from gfimu.visual.rig import drawing_size

@@ -17,7 +17,8 @@ from gfimu.array.array import AccelerometerArray
 from gfimu.array.observability import require_all_motions
 from gfimu.base.errors import GeometryError
 from gfimu.base.files.rerun_stream import markdown
-from gfimu.base.results.colours import AXES, ESTIMATE, HEALTH, TACHO, UNDECIDED, Colour, chip_colour
+from gfimu.base.results.colours import Colour, chip_colour
+from gfimu.visual.colours import AXES, ESTIMATE, HEALTH, TACHO, UNDECIDED
 from gfimu.visual.live_drawing import BODY, EVENTS, LiveDrawing, axis_columns
 from gfimu.visual.plots import entity_part
 from gfimu.visual.rig import array_shapes, axes_shapes, channel_shapes, chip_names, drawing_size, gravity_shapes

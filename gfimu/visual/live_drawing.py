@@ -12,10 +12,10 @@ from scipy.spatial.transform import Rotation
 
 from gfimu.array.array import AccelerometerArray
 from gfimu.array.kinematics import motion_from_readings
-from gfimu.base.results.colours import HEALTH
 from gfimu.motion.attitude import from_rotation, integrate_attitude, to_rotation
 from gfimu.rate.health.fault import HealthCode
 from gfimu.rate.health.live.block import Health, LiveBlock, StreamState
+from gfimu.visual.colours import HEALTH
 from gfimu.visual.plots import broken_at_gaps, entity_part
 from gfimu.visual.rig import channel_shapes
 from gfimu.visual.scene import TIMELINE

@@ -13,7 +13,6 @@ from gfimu.array.turning_axis import TurningAxis
 from gfimu.base.declared import Declared
 from gfimu.base.errors import GeometryError, InputError
 from gfimu.base.files.input_file import as_path
-from gfimu.base.files.table import ArrowStream
 from gfimu.motion.axis_estimation import estimate_about_axis
 from gfimu.motion.estimate import Estimate
 from gfimu.motion.estimation import estimate
@@ -23,6 +22,7 @@ from gfimu.recording.carried_array import carried_array, warn_of_other_array
 from gfimu.recording.checks import examine
 from gfimu.recording.formats import is_estimate, open_run
 from gfimu.recording.mapped import MappedFile
+from gfimu.recording.tables.arrow import ArrowStream
 from gfimu.visual.run import write_estimate, write_run
 
 __all__ = ["Viewed", "picture_of", "picture_path"]

@@ -12,6 +12,7 @@ import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
 from gfimu.base.results.colours import Colour
+from gfimu.recording.sample_times import gaps_of
 from gfimu.visual.scene import TIMELINE
 
 __all__ = ["LONGEST_LEGEND", "Line", "Plot", "broken_at_gaps", "entity_part"]
@@ -166,7 +167,6 @@ def broken_at_gaps(
     """Insert a NaN into every gap of more than 1.5 sample periods: lost samples show as a break, not as a line."""
     if len(t) < 3:
         return t, values
-    steps = np.diff(t)
-    gaps = np.flatnonzero(steps > 1.5 * np.median(steps))
-    middles = t[gaps] + steps[gaps] / 2
+    gaps = gaps_of(t)
+    middles = t[gaps] + np.diff(t)[gaps] / 2
     return np.insert(t, gaps + 1, middles), np.insert(values, gaps + 1, np.nan, axis=0)

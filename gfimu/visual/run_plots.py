@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.array.array import AccelerometerArray
-from gfimu.base.results.colours import AXES, COMMAND, ESTIMATE, ESTIMATE_BAND, TACHO, TRUTH, UNDECIDED, chip_colour
+from gfimu.base.results.colours import chip_colour
 from gfimu.motion.attitude import table_angle, to_rotation
 from gfimu.rate.health.fault import HealthCode
 from gfimu.recording import Recording
+from gfimu.visual.colours import AXES, COMMAND, ESTIMATE, ESTIMATE_BAND, TACHO, TRUTH, UNDECIDED
 from gfimu.visual.motion import ExpectedDrift, KnownMotion, MotionEstimate, reference_rate
 from gfimu.visual.plots import LONGEST_LEGEND, Line, Plot
 

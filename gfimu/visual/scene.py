@@ -15,20 +15,10 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from gfimu.array.array import AccelerometerArray
-from gfimu.base.results.colours import BACKGROUND, METAL, TABLE, Colour, chip_colour
+from gfimu.base.results.colours import Colour, chip_colour
+from gfimu.visual.colours import BACKGROUND, METAL, TABLE
 
-__all__ = [
-    "Body",
-    "Box",
-    "Cylinder",
-    "Mesh",
-    "Names",
-    "Path",
-    "Pointers",
-    "Scene",
-    "SensingArrows",
-    "Shape",
-]
+__all__ = ["Body", "Box", "Cylinder", "Mesh", "Names", "Path", "Pointers", "Scene", "SensingArrows", "Shape"]
 
 TIMELINE = "time"
 """Name of the timeline: time on the board's clock, s."""

@@ -9,7 +9,8 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
-from gfimu.base.results.colours import ESTIMATE, TRUTH, Colour
+from gfimu.base.results.colours import Colour
+from gfimu.visual.colours import ESTIMATE, TRUTH
 from gfimu.visual.scene import TIMELINE
 
 __all__ = ["PositionTrace"]

@@ -44,7 +44,7 @@ class Effect(ABC):
     inexactness: ClassVar[float] = 0.0
     """Share of what it explains that its model may get wrong; beside it a further cause must explain more than that."""
     other_units: ClassVar[Mapping[str, str]] = {}
-    """Unit of each parameter that is no size, by key; `gfimu.base.units.RATIO`, ``NUMBER`` or ``NAME``."""
+    """Unit of each parameter that is no size, by key; `gfimu.model.parameter_units.RATIO`, ``NUMBER`` or ``NAME``."""
     starts: ClassVar[tuple[float, ...]] = ()
     """Values in units of the prior to start from where a large size is far from linear; none by default."""
     whole: ClassVar[frozenset[str]] = frozenset()

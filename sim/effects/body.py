@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from gfimu.array.array import AccelerometerArray
-from gfimu.base.units import RATIO
+from gfimu.model.parameter_units import RATIO
 from sim.effects.base import LARGEST_TURN, Effect, Pattern, Size, chip_patterns
 from sim.world import World
 

@@ -11,7 +11,7 @@ from unicodedata import normalize
 
 from gfimu.array.array import AccelerometerArray
 from gfimu.base.errors import InputError
-from gfimu.base.files.model_files import effect_catalogue
+from gfimu.model.effect_catalogue import effect_catalogue
 from sim.effects.base import Effect
 from sim.effects.description import describe
 from sim.effects.registry import (

@@ -9,7 +9,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from gfimu.array.array import AccelerometerArray
-from gfimu.base.units import MILLI_G, RATIO
+from gfimu.base.units import MILLI_G
+from gfimu.model.parameter_units import RATIO
 from sim.effects.base import Effect, Size
 from sim.effects.low_pass import low_pass, mass_on_spring
 from sim.effects.per_channel import with_step

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from gfimu.array.array import AccelerometerArray
 from gfimu.base.errors import InputError
-from gfimu.base.units import NAME, NUMBER, RATIO
+from gfimu.model.parameter_units import NAME, NUMBER, RATIO
 from sim.effects.base import Effect, Size
 from sim.world import World
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from gfimu.array.array import AccelerometerArray
-from gfimu.base.units import NUMBER, RATIO
+from gfimu.model.parameter_units import NUMBER, RATIO
 from sim.effects.base import LARGEST_TURN, Effect, Pattern, Size, chip_patterns
 from sim.effects.scans import mode_shapes, order_shapes, per_acceleration
 from sim.effects.table_dynamics import Mode, RippledSpin, TwistingSpin

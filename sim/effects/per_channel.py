@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.array.array import AccelerometerArray
-from gfimu.base.units import RATIO
+from gfimu.model.parameter_units import RATIO
 from sim.effects.base import Effect, Pattern, Size, channel_patterns
 from sim.world import SensingStep, World
 

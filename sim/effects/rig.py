@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.signal import cont2discrete, lfilter
 
 from gfimu.array.array import AccelerometerArray
-from gfimu.base.units import NUMBER, RATIO
+from gfimu.model.parameter_units import NUMBER, RATIO
 from gfimu.model.world_model import SpinState, Whitened
 from sim.effects.base import Effect, Pattern, Size, chip_patterns
 from sim.effects.low_pass import low_pass

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.array.array import AccelerometerArray
-from gfimu.base.units import MILLI_G, RATIO, STANDARD_GRAVITY
+from gfimu.base.units import MILLI_G, STANDARD_GRAVITY
+from gfimu.model.parameter_units import RATIO
 from sim.effects.base import LARGEST_TURN, Effect, Pattern, Size, channel_patterns
 from sim.effects.per_channel import PerChannel, with_step
 from sim.world import World

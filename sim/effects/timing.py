@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.array.array import AccelerometerArray
-from gfimu.base.units import NUMBER, RATIO
+from gfimu.model.parameter_units import NUMBER, RATIO
 from gfimu.model.world_model import SpinState
 from sim.effects.base import LARGEST_TURN, Effect, Size
 from sim.effects.scans import order_shapes, per_rate

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from gfimu.array.array import AccelerometerArray
 from gfimu.base.errors import InputError
-from gfimu.base.units import NAME, STANDARD_GRAVITY
+from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.model.generic_basis import OF_READING, UNIT_KEYS, Motion, basis_function, is_of_time, unit_parameters
+from gfimu.model.parameter_units import NAME
 from gfimu.model.world_model import BasisUnits, SpinState
 from sim.effects.base import Effect, Pattern, Size
 from sim.world import SampleContext, World

@@ -108,7 +108,7 @@ def test_a_full_disk_at_the_end_of_a_virtual_run(gfimu_command, tmp_path, monkey
     def no_room(*_) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr("gfimu.base.files.column_file._write_csv", no_room)
+    monkeypatch.setattr("gfimu.recording.tables.column_file._write_csv", no_room)
     out = tmp_path / "run.csv"
     result = gfimu_command("firmware", "run", "--scenario", "rest", "--duration", "0.2", "--out", out)
     assert result.code == 1
@@ -189,8 +189,8 @@ def test_live_follows_what_record_is_writing(tmp_path, name) -> None:
 def test_without_a_display_a_live_picture_is_one_line_before_anything_is_written(
     gfimu_command, tmp_path, monkeypatch
 ) -> None:
-    monkeypatch.setattr("gfimu.base.files.rerun_stream.has_display", lambda: False)
-    monkeypatch.setattr("gfimu.base.files.rerun_stream.viewer_listens", lambda: False)
+    monkeypatch.setattr("gfimu.visual.viewer.has_display", lambda: False)
+    monkeypatch.setattr("gfimu.visual.viewer.viewer_listens", lambda: False)
     result = gfimu_command("record", "--port", "/dev/nothing", "--out", tmp_path / "run.csv", "--live")
     assert result.code == 1
     assert "no display here" in result.stderr

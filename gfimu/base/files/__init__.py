@@ -1,1 +1,1 @@
-"""Files: whole or not at all; columns, tables, models, rerun streams, checks of outputs before long work."""
+"""Files: whole or not at all; schemas, models, rerun streams, checks of outputs before long work."""

@@ -12,10 +12,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from gfimu.base.errors import InputError, WriteError
+from gfimu.base.errors import InputError, WriteError, system_errors
 from gfimu.base.files.outputs import check_parent
 
 __all__ = ["atomic_folder", "atomic_path", "write_text"]
+
+_ELSEWHERE = "choose a folder that can be written"
 
 
 @contextmanager
@@ -37,12 +39,10 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
     if target.is_dir():
         raise InputError(f"{target}: is a directory; name a file in it")
     _remove_abandoned(target.parent)
-    try:
+    with system_errors(target, _ELSEWHERE):
         handle, name = tempfile.mkstemp(
             prefix=f"{_own_prefix()}{os.getpid()}-", suffix=target.suffix, dir=target.parent
         )
-    except OSError as error:
-        raise InputError(f"{target}: {error.strerror or error}; choose a folder that can be written") from None
     os.close(handle)
     temporary = Path(name)
     try:
@@ -74,12 +74,10 @@ def atomic_folder(path: str | Path) -> Iterator[Path]:
     """
     folder = Path(path)
     check_parent(folder)
-    try:
+    with system_errors(folder, _ELSEWHERE):
         folder.mkdir(exist_ok=True)
         _remove_abandoned(folder)
         made = Path(tempfile.mkdtemp(prefix=f"{_own_prefix()}{os.getpid()}-", dir=folder))
-    except OSError as error:
-        raise InputError(f"{folder}: {error.strerror or error}; choose a folder that can be written") from None
     try:
         yield made
         for file in made.iterdir():

@@ -3,30 +3,16 @@
 from __future__ import annotations
 
 import importlib.util
-import json
 import re
 import tomllib
-from collections.abc import Callable, Mapping
-from functools import cache
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from gfimu.base.errors import InputError, unknown_name
+from gfimu.base.errors import InputError, system_errors, unknown_name
 from gfimu.base.files.input_file import LARGEST_TEXT, check_input, is_ordinary
 
-__all__ = [
-    "EFFECT_CATALOGUE",
-    "effect_catalogue",
-    "find_model",
-    "list_models",
-    "models_directory",
-    "parse_toml",
-    "read_toml",
-    "set_key",
-]
-
-EFFECT_CATALOGUE = "effects/catalogue.json"
-"""File of what was computed of each effect, below the folder of the models."""
+__all__ = ["find_model", "list_models", "models_directory", "parse_toml", "read_toml", "set_key"]
 
 _LONGEST_REASON = 160
 _MOST_PARTS = 100  # numerical: of a dotted key
@@ -53,13 +39,6 @@ def models_directory() -> Path:
 def list_models(kind: str, suffix: str = ".toml") -> list[str]:
     """Names of the models of one kind (``arrays``, ``scenarios``, ``twins``, ``parts``, ``mjcf``)."""
     return sorted(path.stem for path in (models_directory() / kind).glob(f"*{suffix}"))
-
-
-@cache
-def effect_catalogue() -> Mapping[str, Any]:
-    """Return what was computed of each effect of gfimu, by name; empty where nothing is stored."""
-    file = models_directory() / EFFECT_CATALOGUE
-    return json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
 
 
 def find_model(kind: str, name: str | Path, *, beside: Path | None = None, suffix: str = ".toml") -> Path:
@@ -98,11 +77,10 @@ def read_toml(path: Path) -> dict[str, Any]:
     """Read a TOML file; a syntax error or unreadable file becomes an `InputError` that names it."""
     check_input(path, largest=LARGEST_TEXT)
     try:
-        text = path.read_text(encoding="utf-8")
+        with system_errors(path):
+            text = path.read_text(encoding="utf-8")
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: not valid TOML ({error}); correct the file") from None
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror or error}; check the path") from None
     return parse_toml(text, path)
 
 

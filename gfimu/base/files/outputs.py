@@ -8,45 +8,14 @@ be none of the files that the command reads, nor another of its outputs; symboli
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from gfimu.base.errors import InputError
 from gfimu.base.optional_packages import require
 
-__all__ = [
-    "ARRAY_FILE",
-    "CALIBRATION",
-    "COLUMN_MAP",
-    "ESTIMATE",
-    "EXPORT",
-    "JSON_SCHEMA",
-    "KALIBR",
-    "PICTURE",
-    "RECORDING",
-    "RERUN",
-    "SCENARIO",
-    "TOML_FILE",
-    "TRACE",
-    "Output",
-    "OutputFile",
-    "OutputFolder",
-    "check_outputs",
-    "check_parent",
-    "files_named",
-    "same_file",
-]
-
-
-_MODELS = {
-    "array": "arrays",
-    "column_map": "maps",
-    "scenario": "scenarios",
-    "twin": "twins",
-}
-"""Arguments that may hold the name of a shipped model, and the folder of `models` where it lies."""
+__all__ = ["RECORDING", "RERUN", "Output", "OutputFile", "OutputFolder", "check_outputs", "check_parent", "same_file"]
 
 
 @dataclass(frozen=True)
@@ -123,24 +92,7 @@ class OutputFolder:
 Output = OutputFile | OutputFolder
 
 RECORDING = OutputFile("a recording", (".csv", ".parquet"))
-EXPORT = OutputFile(
-    "what is converted",
-    (".csv", ".parquet", ".mcap", ".euroc", ".yaml", ".yml", ".xml"),
-    {".mcap": ("mcap", "rosbags"), ".xml": ("mujoco",)},
-)
-ESTIMATE = OutputFile("an estimate", (".csv", ".parquet"))
 RERUN = OutputFile("a rerun recording", (".rrd",), {".rrd": ("rerun",)})
-TRACE = OutputFile("a trace", (".vcd", ".rrd"), {".rrd": ("rerun",)})
-CALIBRATION = OutputFile("a calibration", (".json",))
-COLUMN_MAP = OutputFile("a column map", (".toml",))
-ARRAY_FILE = OutputFile("an array file", (".toml",))
-SCENARIO = OutputFile("a scenario file", (".toml",))
-TOML_FILE = OutputFile("a TOML file", (".toml",))
-KALIBR = OutputFile("a Kalibr file", (".yaml", ".yml"))
-JSON_SCHEMA = OutputFile("a JSON schema", (".json",))
-PICTURE = OutputFile(
-    "a picture", (".png", ".svg", ".pdf"), dict.fromkeys((".png", ".svg", ".pdf"), ("matplotlib",)), any_case=True
-)
 
 
 def check_parent(path: Path) -> None:
@@ -195,56 +147,6 @@ def _check(outputs: Iterable[tuple[str, str | Path, Output]], read: list[Path]) 
                         f"{file}: {_option(other)} and {_option(name)} name the same file; choose two different ones"
                     )
             written.append((name, file))
-
-
-def files_named(arguments: Mapping[str, Any]) -> Iterator[Path]:
-    """Yield the files that arguments name, and the array files that those name in turn; objects name none."""
-    for name, value in arguments.items():
-        for item in value if isinstance(value, list | tuple) else [value]:
-            if isinstance(item, str | os.PathLike):
-                path = _model_file(_MODELS.get(name, ""), os.fspath(item) if not isinstance(item, Path) else item)
-                yield path
-                yield from _named_inside(path)
-
-
-def _model_file(kind: str, name: str | Path) -> Path:
-    """Return the file behind a name; a name that is unknown is left for its reader to refuse."""
-    if kind and isinstance(name, str):
-        from gfimu.base.files.model_files import find_model
-
-        try:
-            return find_model(kind, name)
-        except InputError:
-            pass
-    return Path(name)
-
-
-def _named_inside(path: Path, seen: frozenset[Path] = frozenset()) -> Iterator[Path]:
-    """Yield the files that a TOML file names (a twin its array, an array its part), and the verdict in a folder."""
-    if path.is_dir():
-        yield path / "verdict.json"
-    if path.suffix != ".toml" or not path.is_file() or path in seen:
-        return
-    from gfimu.base.files.model_files import read_toml
-
-    try:
-        content = read_toml(path)
-    except InputError:
-        return  # its reader refuses it
-    for text in _texts(content):
-        if text.endswith(".toml"):
-            for named in (path.parent / text, Path(text)):
-                yield named
-                yield from _named_inside(named, seen | {path})
-
-
-def _texts(value: Any) -> Iterator[str]:
-    """Yield all texts inside a TOML value."""
-    if isinstance(value, str):
-        yield value
-    elif isinstance(value, dict | list):
-        for item in value.values() if isinstance(value, dict) else value:
-            yield from _texts(item)
 
 
 def _check_kind(path: Path, output: Output) -> None:

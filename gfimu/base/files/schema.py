@@ -2,12 +2,13 @@
 
 A file kind is a `Table` whose annotations carry all that is known of a key: type, bounds, unit and meaning (`about`).
 `read` turns the content of a file into that struct. Its errors are one line with the file, the table, the key, the
-value and what is valid. The reference page, the JSON schema for editors (`gfimu.base.files.schema_keys`) and the checks
-of the templates come from the same struct, so a new key is one annotated line.
+value and what is valid. The JSON schema for editors (`json_schema`), the reference page and the checks of the
+templates come from the same struct, so a new key is one annotated line.
 """
 
 from __future__ import annotations
 
+import json
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -20,7 +21,7 @@ from msgspec import inspect as types
 from gfimu.base.errors import InputError, did_you_mean, nearest_name
 from gfimu.base.units import SIZES, is_usable
 
-__all__ = ["NotNegative", "Positive", "Table", "Triple", "about", "read", "tagged", "without_none"]
+__all__ = ["NotNegative", "Positive", "Table", "Triple", "about", "json_schema", "read", "tagged", "without_none"]
 
 Triple = tuple[float, float, float]
 """Three finite numbers, one per axis."""
@@ -47,7 +48,6 @@ def about(
     default: str = "",
     example: Any = None,
     must_be: str = "",
-    shown: Mapping[str, Any] | None = None,
     **limits: Any,
 ) -> msgspec.Meta:
     """Return what is known of a key, for ``Annotated[type, about(...)]``.
@@ -64,8 +64,6 @@ def about(
         A value for the message that the key is missing.
     must_be : str
         What the value must be, for messages, where the type does not say it well.
-    shown : mapping, optional
-        Of a result, how tables and JSON show it (`gfimu.base.declared.figure`).
     **limits
         Bounds of `msgspec.Meta`: ``gt``, ``ge``, ``lt``, ``le``, ``min_length``, ``max_length``, ``pattern``.
     """
@@ -73,7 +71,7 @@ def about(
     return msgspec.Meta(
         description=f"{meaning} ({unit})" if unit else meaning,
         examples=None if example is None else [example],
-        extra={key: value for key, value in notes.items() if value} | dict(shown or {}),
+        extra={key: value for key, value in notes.items() if value},
         **limits,
     )
 
@@ -228,7 +226,10 @@ def _explained(message: str, data: Any, kind: type[Table], source: str) -> Input
     for number, step in enumerate(steps, start=1):
         at.step(step[1] or "", step[2] or "", bool(of_table) or number < len(steps))
     if of_table and of_table[1] == "contains unknown":
-        return InputError(f"{at.where}: {_unknown(of_table[2], _valid_keys(at.table()))}")
+        key, table = of_table[2], at.table()
+        tag = {table.tag_field} if table and table.tag_field else set()
+        valid = sorted({one.name for one in table.fields} | tag) if table else []
+        return InputError(f"{at.where}: unknown key {key!r}; valid: {', '.join(valid)}{_nearest(key, valid)}")
     if of_table:
         return InputError(f"{at.where}: {_missing(of_table[2], at.of_key(of_table[2]))}")
     if isinstance(at.key_value, Sequence) and not at.key_value and _is_list_of_tables(at.key_info):
@@ -236,16 +237,6 @@ def _explained(message: str, data: Any, kind: type[Table], source: str) -> Input
     finite = isinstance(at.key_value, int) or (isinstance(at.key_value, float) and math.isfinite(at.key_value))
     must_be = SIZES if reason == "size" and finite else _must_be(at)
     return InputError(f"{at.where}: {at.key} = {_short(at.key_value)} must be {must_be}")
-
-
-def _valid_keys(table: types.StructType | None) -> list[str]:
-    if table is None:
-        return []
-    return sorted({one.name for one in table.fields} | ({table.tag_field} if table.tag_field else set()))
-
-
-def _unknown(key: str, valid: Sequence[str]) -> str:
-    return f"unknown key {key!r}; valid: {', '.join(valid)}{_nearest(key, valid)}"
 
 
 def _nearest(word: Any, valid: Sequence[Any]) -> str:
@@ -318,3 +309,37 @@ def _bound(info: types.IntType | types.FloatType, before: str = "") -> str:
 def _short(value: Any, *, toml: bool = False) -> str:
     text = f'"{value}"' if toml and isinstance(value, str) else repr(value)
     return text if len(text) <= _LONGEST_VALUE else f"{text[: _LONGEST_VALUE - 2]} …"
+
+
+def json_schema(kind: type[msgspec.Struct], title: str) -> str:
+    """Return the JSON schema of a kind of file, by which an editor completes and checks it."""
+    found = msgspec.json.schema(kind)
+    definitions = found["$defs"]
+    definitions[kind.__name__]["title"] = title
+    for schema in definitions.values():
+        schema["description"] = schema.get("description", "").partition("\n")[0].replace("``", "`")
+        for value in schema["properties"].values():
+            _release_tag(value, definitions)
+    _without_prefix_items(found)
+    return json.dumps({"$schema": "http://json-schema.org/draft-07/schema#", **found}, indent=1) + "\n"
+
+
+def _release_tag(value: Mapping[str, Any], definitions: Mapping[str, Any]) -> None:
+    """Let the tag of a table with a default be left out."""
+    choice, default = value.get("discriminator", {}), value.get("default")
+    if choice and isinstance(default, dict):
+        tag = choice["propertyName"]
+        chosen = definitions[choice["mapping"][default[tag]].rpartition("/")[2]]
+        chosen["required"] = [key for key in chosen["required"] if key != tag]
+
+
+def _without_prefix_items(value: Any) -> None:
+    """Write lists of a fixed length as older drafts of JSON schema do, which most editors know."""
+    if isinstance(value, dict):
+        if "prefixItems" in value:
+            value["items"] = value.pop("prefixItems")[0]
+        for one in value.values():
+            _without_prefix_items(one)
+    elif isinstance(value, list):
+        for one in value:
+            _without_prefix_items(one)

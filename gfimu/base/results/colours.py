@@ -1,49 +1,28 @@
-"""The colours of every picture: one module owns them, so that the same quantity has the same colour everywhere.
+"""The colours of pictures on paper and of chips, so that the same quantity has the same colour everywhere.
 
 Chips take one hue each, in any number: hue and lightness in OKLCH (B. Ottosson, 2020), a space whose steps look alike,
 with the hue turned by the golden angle from chip to chip. A chip's hue follows from its number alone, so it is the same
 in each picture, and neighbours in number are far apart in hue. The sensing axes of a chip differ in lightness.
 
 Body axes follow the field's convention (x red, y green, z blue). What was before is orange and what came after is blue
-(vermilion and blue of M. Okabe and K. Ito, 2008, on paper). The sets in `SEPARATED` stay apart for the colour-blind;
-the tests simulate their vision.
+(vermilion and blue of M. Okabe and K. Ito, 2008, on paper). The colours of one picture stay apart for the
+colour-blind; the tests simulate their vision. Those of the viewer and of HTML pages are in `gfimu.visual.colours`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 __all__ = [
-    "AFTER",
     "AFTER_ON_PAPER",
-    "AXES",
     "AXES_ON_PAPER",
-    "BACKGROUND",
-    "BEFORE",
     "BEFORE_ON_PAPER",
-    "COMMAND",
     "DIVERGING",
-    "ESTIMATE",
-    "ESTIMATE_BAND",
-    "GRAVITY",
-    "HEALTH",
     "INK",
-    "MEASURED",
-    "METAL",
     "NOISE_ON_PAPER",
-    "PAGE",
     "PALE",
-    "SEPARATED",
-    "SPIN_AXIS",
     "SPIN_AXIS_ON_PAPER",
     "STYLES",
-    "TABLE",
-    "TACHO",
-    "TONES",
-    "TRUTH",
-    "UNDECIDED",
     "Colour",
     "chip_colour",
     "css",
@@ -52,25 +31,7 @@ __all__ = [
 Colour = tuple[int, int, int] | tuple[int, int, int, int]
 """Red, green, blue and optionally opacity, each 0 to 255."""
 
-AXES: tuple[Colour, Colour, Colour] = ((213, 60, 60), (150, 225, 120), (70, 130, 250))
 AXES_ON_PAPER: tuple[Colour, Colour, Colour] = ((180, 30, 40), (96, 178, 60), (36, 72, 190))
-TRUTH: Colour = (165, 168, 174)
-ESTIMATE: Colour = (240, 140, 20)
-ESTIMATE_BAND: Colour = (196, 146, 88)
-UNDECIDED: Colour = (235, 90, 165)
-"""The rate where its sign is not decided."""
-TACHO: Colour = (86, 190, 240)
-COMMAND: Colour = (140, 95, 215)
-MEASURED: Colour = (138, 142, 150)
-BEFORE: Colour = (230, 120, 0)
-AFTER: Colour = (70, 160, 240)
-METAL: Colour = (186, 194, 204)
-TABLE: Colour = (78, 88, 102)
-GRAVITY: Colour = (236, 236, 240)
-SPIN_AXIS: Colour = (240, 228, 66)
-BACKGROUND: Colour = (24, 26, 30)
-"""Of the 3-D view."""
-
 BEFORE_ON_PAPER: Colour = (213, 94, 0)
 AFTER_ON_PAPER: Colour = (0, 114, 178)
 NOISE_ON_PAPER: Colour = (138, 143, 152)
@@ -82,75 +43,6 @@ DIVERGING = "RdBu_r"
 
 STYLES = ("-", (0, (4.5, 1.2)), (0, (1.2, 1.0)))
 """Lines of the first, second and third sensing axis of a chip on paper: full, dashed, dotted (of matplotlib)."""
-
-TONES: Mapping[str, Colour] = {
-    "calm": (31, 122, 85),
-    "found": (28, 95, 168),
-    "open": (154, 98, 0),
-    "alarm": (176, 48, 48),
-}
-"""Of the verdicts of a diagnosis, which are written beside them."""
-
-PAGE: Mapping[str, Mapping[str, Colour]] = {
-    "light": {
-        "ground": (244, 245, 247),
-        "card": (255, 255, 255),
-        "code": (238, 240, 243),
-        "pressed": (226, 232, 240),
-        "ink": INK,
-        "quiet": (93, 100, 112),
-        "line": (223, 227, 232),
-        "edge": (138, 143, 152),
-        "focus": (28, 95, 168),
-        "band": PALE,
-        "noise": NOISE_ON_PAPER,
-        "before": BEFORE_ON_PAPER,
-        "after": AFTER_ON_PAPER,
-        "spin-axis": SPIN_AXIS_ON_PAPER,
-        **TONES,
-    },
-    "dark": {
-        "ground": (17, 19, 23),
-        "card": BACKGROUND,
-        "code": (42, 46, 54),
-        "pressed": (54, 62, 74),
-        "ink": (228, 231, 236),
-        "quiet": (160, 167, 178),
-        "line": (54, 59, 68),
-        "edge": (112, 119, 131),
-        "focus": (120, 180, 250),
-        "band": (66, 72, 82),
-        "noise": MEASURED,
-        "before": BEFORE,
-        "after": AFTER,
-        "spin-axis": SPIN_AXIS,
-        "calm": (88, 196, 150),
-        "found": (110, 175, 245),
-        "open": (226, 166, 40),
-        "alarm": (245, 125, 118),
-    },
-}
-"""Of an HTML page by day and by night, by the names of its style sheet; a name means the same in both."""
-
-HEALTH: Mapping[str, Colour] = {
-    "not watched": (104, 110, 120),
-    "used": (40, 130, 96),
-    "in doubt": (226, 166, 40),
-    "excluded": (205, 50, 50),
-    "missing": (44, 48, 56),
-    "saturated": (150, 86, 200),
-    "stuck": (64, 132, 224),
-}
-"""Of the health of a channel, by the word that is written in its lane."""
-
-SEPARATED: Mapping[str, Mapping[str, Colour]] = {
-    "run": {"truth": TRUTH, "estimate": ESTIMATE, "tacho": TACHO, "command": COMMAND},
-    "body axes": dict(zip("xyz", AXES, strict=True)),
-    "body axes on paper": dict(zip("xyz", AXES_ON_PAPER, strict=True)),
-    "comparison": {"measured": MEASURED, "before": BEFORE, "after": AFTER},
-    "report": {"noise": NOISE_ON_PAPER, "before": BEFORE_ON_PAPER, "after": AFTER_ON_PAPER, "ink": INK},
-}
-"""Colours of one picture that a reader has to distinguish, by picture."""
 
 _GOLDEN_TURN = (np.sqrt(5.0) - 1.0) / 2.0
 _FIRST_HUE = 80.0  # degrees; of those tried in steps of 10, the colour-blind see the first eight chips best apart

@@ -4,29 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.base.files.atomic_file import atomic_path
 from gfimu.base.results.panels import OF_TIME, Panel, Series
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
 
-__all__ = ["drawn", "drawn_chips"]
+__all__ = ["drawn", "drawn_chips", "save_figure", "write_panels"]
 
 _WIDTH, _HEIGHT = 7.0, 2.7  # inches of one panel
 _LONGEST_LEGEND = 12
 _MOST_POINTS = 20_000  # of a line; more can't be seen and make a slow picture
 _MANY_NAMES = 7  # under a panel, from which they are turned
-_STYLES = {"line": "-", "dashes": "--", "dots": ":"}
+_UNSTAMPED = {"svg": {"Date": None}, "png": {"Software": None}}  # the same figure gives the same file
+_STYLES = {"line": "-", "dashes": "--", "dots": ":", "points": "."}
 
 
 def drawn(panels: Sequence[Panel], figure: Figure | SubFigure | None = None) -> Figure | SubFigure:
     """Draw panels one below the other, in two columns where they are many."""
-    across = 2 if len(panels) > 3 else 1
-    down = -(-len(panels) // across)
+    across, down = _across_and_down(panels)
     drawing = _new_figure(across, down) if figure is None else figure
     grid = drawing.subplots(down, across, squeeze=False)
     for axes, panel in zip(grid.flat, panels, strict=False):
@@ -34,6 +36,32 @@ def drawn(panels: Sequence[Panel], figure: Figure | SubFigure | None = None) -> 
     for axes in grid.flat[len(panels) :]:
         axes.remove()
     return drawing
+
+
+def write_panels(path: str | Path, title: str, panels: Sequence[Panel]) -> None:
+    """Write a picture of panels below a title, as `save_figure`."""
+    from matplotlib.figure import Figure
+
+    figure = drawn(panels, Figure(figsize=_size(*_across_and_down(panels)), layout="constrained"))
+    figure.suptitle(_literal(title), fontsize=11)
+    save_figure(path, figure)
+
+
+def save_figure(path: str | Path, figure: Any, dpi: int = 120) -> None:
+    """Write a figure, whole or not at all; the extension decides the format, PNG without one."""
+    kind = Path(path).suffix.lstrip(".").lower() or "png"
+    with atomic_path(path) as temporary:
+        figure.savefig(temporary, dpi=dpi, format=kind, metadata=_UNSTAMPED.get(kind))
+
+
+def _across_and_down(panels: Sequence[Panel]) -> tuple[int, int]:
+    across = 2 if len(panels) > 3 else 1
+    return across, -(-len(panels) // across)
+
+
+def _size(across: int, down: int) -> tuple[float, float]:
+    """Return width and height of a figure, inches."""
+    return _WIDTH * across, _HEIGHT * down + 0.4
 
 
 def drawn_chips(
@@ -85,7 +113,7 @@ def _new_figure(across: int, down: int) -> Figure:
     import matplotlib as mpl
     from matplotlib import pyplot as plt
 
-    figure = plt.figure(figsize=(_WIDTH * across, _HEIGHT * down + 0.4), layout="constrained")
+    figure = plt.figure(figsize=_size(across, down), layout="constrained")
     backend = mpl.get_backend().lower()
     if backend == "agg" or "inline" in backend:  # a notebook shows the cell's value; it would show this one twice
         plt.close(figure)
@@ -117,6 +145,8 @@ def _draw_lines(axes: Any, panel: Panel) -> None:
         axes.plot(
             t, y, _STYLES.get(series.style, "-"), color=colour, linewidth=1.1, label=_label(series) or "_", zorder=3
         )
+    if panel.shaded is not None:
+        axes.axvspan(*panel.shaded, color="0.93", zorder=-1)
     axes.set_xlabel(panel.x_label)
     if panel.scale == "log":
         axes.set_xscale("log")

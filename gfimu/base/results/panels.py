@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["OF_TIME", "Panel", "Series", "axis_series", "one_row", "text_column"]
+__all__ = ["OF_TIME", "Panel", "Series", "axis_series", "columns_of", "one_row", "text_column"]
 
 OF_TIME = "time, s"
 """Label along a line over time."""
@@ -33,8 +33,8 @@ class Series:
         Number of the chip whose colour the series has; by default that of its place in the panel.
     role : {"", "x", "y", "z", "before", "after", "noise"}
         Body axis, or part in a comparison, whose colour the series has.
-    style : {"line", "dots", "dashes"}
-        How a line is drawn.
+    style : {"line", "dots", "dashes", "points"}
+        How a line is drawn; points are not joined.
     """
 
     name: str
@@ -64,6 +64,8 @@ class Panel:
         Quantity and unit along the line.
     scale : {"linear", "zero", "log"}
         ``zero``: the values' axis begins at zero. ``log``: it is logarithmic, and so is the axis along a line.
+    shaded : tuple of float, optional
+        Part along a line that is shaded: its first and last place.
     """
 
     title: str
@@ -72,6 +74,7 @@ class Panel:
     x: NDArray[np.float64] | tuple[str, ...]
     x_label: str = OF_TIME
     scale: str = "linear"
+    shaded: tuple[float, float] | None = None
 
     @property
     def by_name(self) -> bool:
@@ -91,12 +94,22 @@ def axis_series(
 
 def one_row(values: Mapping[str, object]) -> dict[str, NDArray[Any]]:
     """Return values as a table of one row, by name with unit; what is no number is text, and empty where it is None."""
-    return {
-        name: np.array([value])
-        if isinstance(value, int | float)
-        else text_column(["" if value is None else str(value)])
-        for name, value in values.items()
-    }
+    return {name: text_column([""]) if value is None else _column([value]) for name, value in values.items()}
+
+
+def columns_of(rows: Iterable[object], names: str) -> dict[str, NDArray[Any]]:
+    """Return a table of results: a row each, and of their attributes the ``names``, between spaces.
+
+    A column of numbers has NaN where one is None; others are texts.
+    """
+    listed = list(rows)
+    return {name: _column([getattr(row, name) for row in listed]) for name in names.split()}
+
+
+def _column(values: Sequence[Any]) -> NDArray[Any]:
+    if all(value is None or isinstance(value, int | float | np.number | np.bool_) for value in values):
+        return np.array([np.nan if value is None else value for value in values])
+    return text_column(map(str, values))
 
 
 def text_column(values: Iterable[str]) -> NDArray[np.object_]:

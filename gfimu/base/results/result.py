@@ -50,7 +50,7 @@ class TableResult(ABC):
         require("to_pandas", "pandas")
         import pandas as pd
 
-        from gfimu.base.files.table import to_json
+        from gfimu.base.files.metadata import to_json
 
         table = pd.DataFrame(dict(self.to_columns()))
         table.attrs = json.loads(to_json(dict(self._table_metadata())))
@@ -73,12 +73,10 @@ class TableResult(ABC):
         """Return the columns as a pyarrow table, with the metadata as JSON in its schema."""
         import pyarrow as pa
 
-        from gfimu.base.files.table import column_type, schema_metadata
+        from gfimu.base.files.metadata import schema_metadata
 
-        columns = self.to_columns()
-        fields = [(name, column_type(values)) for name, values in columns.items()]
-        schema = pa.schema(fields, metadata=schema_metadata(self._table_metadata()))
-        return pa.table([pa.array(values) for values in columns.values()], schema=schema)
+        columns = {name: pa.array(values) for name, values in self.to_columns().items()}
+        return pa.table(columns, metadata=schema_metadata(self._table_metadata()))
 
     def __arrow_c_stream__(self, requested_schema: Any = None) -> Any:
         """Return the columns as an Arrow stream: ``polars.DataFrame(result)``, ``pyarrow.table(result)``."""
@@ -143,6 +141,21 @@ class PlottedResult(TableResult):
         from gfimu.base.results.figure import drawn
 
         return drawn(self._panels(), figure)
+
+    def to_picture(self, path: str | Path) -> None:
+        """Write the picture of `plot` below the heading of the result, ``.png``, ``.svg`` or ``.pdf``.
+
+        Raises
+        ------
+        MissingPackageError
+            If matplotlib is not installed.
+        InputError
+            If the folder of the file can't be written to.
+        """
+        require("a picture", "matplotlib")
+        from gfimu.base.results.figure import write_panels
+
+        write_panels(path, self._heading(), self._panels())
 
     def log(self, stream: rr.RecordingStream, entity: str = "") -> None:
         """Log the facts and panels of the result to a rerun stream.

@@ -32,13 +32,7 @@ from gfimu.budget.drift.closed_forms import (
     position_from_rate,
 )
 
-__all__ = [
-    "TILT_LIMIT",
-    "DriftBudget",
-    "DriftTerm",
-    "ErrorSources",
-    "drift_budget",
-]
+__all__ = ["TILT_LIMIT", "DriftBudget", "DriftTerm", "ErrorSources", "drift_budget"]
 
 TILT_LIMIT = 0.25
 """Attitude error up to which the first-order forms are taken to hold, rad, one standard deviation per axis."""

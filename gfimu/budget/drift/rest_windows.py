@@ -109,7 +109,7 @@ class RestDrift(Declared, PlottedResult):
         return columns
 
     def _heading(self) -> str:
-        return f"Position error of {self.array} at rest after {self.time_s:g} s"
+        return f"Position error of {self.array} at rest after {self.time_s:g} s, biases read off over {self.lead_s:g} s"
 
     def _facts(self) -> list[tuple[str, str]]:
         low, high = self.ratio_interval
@@ -126,9 +126,16 @@ class RestDrift(Declared, PlottedResult):
         std = np.sqrt(np.mean(self.predicted_std_m**2, axis=0))
         panels = []
         for place, axis in enumerate("xyz"):
-            predicted = Series("predicted", mean[:, place], std[:, place], x=self.predicted_t_s, role="noise")
+            size, likely_size = self.rms_m[place], self.predicted_m[place]
+            predicted = Series(
+                f"predicted from the noise, {likely_size:.3g} m",
+                mean[:, place],
+                std[:, place],
+                x=self.predicted_t_s,
+                role="noise",
+            )
             windows = [
-                Series("navigation" if index == 0 else "", error[:, place], role=axis)
+                Series("" if index else f"{len(self.start_s)} windows, rms {size:.3g} m", error[:, place], role=axis)
                 for index, error in enumerate(self.error_m)
             ]
             panels.append(Panel(f"position error, {axis}", "m", (predicted, *windows), self.t_s))

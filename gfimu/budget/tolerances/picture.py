@@ -12,7 +12,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 from numpy.typing import NDArray
 
-from gfimu.base.files.atomic_file import atomic_path
+from gfimu.base.results import save_figure
 from gfimu.base.results.colours import (
     AFTER_ON_PAPER,
     BEFORE_ON_PAPER,
@@ -83,8 +83,7 @@ def tolerance_picture(
     if handles:
         figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), fontsize=9, frameon=False)
     figure.suptitle(title, fontsize=11)
-    with atomic_path(path) as temporary:
-        figure.savefig(temporary, dpi=100, format=Path(path).suffix.lstrip("."))
+    save_figure(path, figure, 100)
 
 
 def _distributions(

@@ -20,13 +20,12 @@ from pathlib import Path
 from typing import Any, Literal
 
 import msgspec
-import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.base.declared import Table
 from gfimu.base.errors import InputError
 from gfimu.base.files.atomic_file import write_text
-from gfimu.base.results import TableResult, text_column
+from gfimu.base.results import TableResult, columns_of, text_column
 
 __all__ = [
     "FORMAT",
@@ -312,17 +311,8 @@ class Certificate(TableResult):
 
     def to_columns(self) -> dict[str, NDArray[Any]]:
         """Return one row per term: value, standard and expanded uncertainty, coverage factor, unit."""
-
-        def number(value: float | None) -> float:
-            return math.nan if value is None else value
-
-        keys = ("value", "std", "expanded", "coverage_factor", "degrees_of_freedom")
-        return {
-            "term": text_column(term.name for term in self.terms),
-            "meaning": text_column(term.meaning for term in self.terms),
-            **{key: np.array([number(getattr(term, key)) for term in self.terms]) for key in keys},
-            "unit": text_column(term.unit for term in self.terms),
-        }
+        names = {"term": text_column(term.name for term in self.terms)}
+        return names | columns_of(self.terms, "meaning value std expanded coverage_factor degrees_of_freedom unit")
 
     def _heading(self) -> str:
         return f"Certificate of {self.item}"

@@ -8,17 +8,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, FileSystemLoader, select_autoescape
 from markupsafe import Markup, escape
 
-from gfimu.base.errors import printable
 from gfimu.base.files.atomic_file import atomic_folder
 from gfimu.calibration.certificate.certificate import Certificate, ChipCertificate, Component, Term
 from gfimu.calibration.certificate.numbers import plain_number, plus_minus
-from gfimu.visual.page import STILL_POLICY, page_basics
+from gfimu.visual.page import page_basics, page_text
 
 __all__ = ["certificate_html", "write_certificate"]
 
+_TEMPLATE = Path(__file__).parent / "templates" / "certificate.html.j2"
 _CONDITIONS = {
     "temperature_degC": "temperature, °C",
     "poses": "poses",
@@ -64,14 +63,7 @@ def write_certificate(directory: str | Path, certificate: Certificate) -> dict[s
 
 def certificate_html(certificate: Certificate) -> str:
     """Return the certificate as HTML without references to anything outside it."""
-    environment = Environment(
-        loader=FileSystemLoader(Path(__file__).parent / "templates"),
-        autoescape=select_autoescape(default=True, default_for_string=True),
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters["symbol"] = _symbol
-    return printable(environment.get_template("certificate.html.j2").render(_content(certificate)))
+    return page_text(_TEMPLATE, _content(certificate), {"symbol": _symbol})
 
 
 def _symbol(text: str) -> Markup:
@@ -85,8 +77,7 @@ def _content(certificate: Certificate) -> Mapping[str, Any]:
     both = len(certificate.chips) == 1
     sheet, comparison = certificate.angular_sensor, certificate.comparison
     return {
-        "basics": page_basics(),
-        "policy": STILL_POLICY,
+        "style": page_basics(),
         "certificate": certificate,
         "unit": _UNITS[certificate.unit],
         "single": both,

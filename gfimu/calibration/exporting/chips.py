@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from gfimu.array.array import AccelerometerArray, Chip
 from gfimu.base.errors import InputError
-from gfimu.base.units import GYRO_COLUMNS
 from gfimu.recording import Recording
+from gfimu.recording.quantities import GYRO_COLUMNS
 from gfimu.recording.timing.reference_times import reference_on_rows
 
 __all__ = ["ChipStream", "chips_of", "stamps_ns"]

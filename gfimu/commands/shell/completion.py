@@ -95,7 +95,7 @@ def shown(incomplete: str) -> Values:
 
 
 def _catalogued(incomplete: str) -> Values:
-    from gfimu.base.files.model_files import effect_catalogue
+    from gfimu.model.effect_catalogue import effect_catalogue
 
     return beginning(incomplete, effect_catalogue())
 

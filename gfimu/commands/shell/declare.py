@@ -17,8 +17,9 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, ParamSpec, Protocol, TypeVar, get_args, get_origin, overload
 
 from gfimu.base.errors import InputError, did_you_mean, unknown_name
-from gfimu.base.files.outputs import Output, OutputFolder, check_outputs, files_named
+from gfimu.base.files.outputs import Output, OutputFolder, check_outputs
 from gfimu.commands.shell.completion import words
+from gfimu.commands.shell.named_files import files_named
 
 __all__ = ["Command", "Group", "Option", "choices_of", "command", "command_of", "marked", "module_help"]
 

@@ -7,10 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from gfimu.base.files.outputs import PICTURE as PICTURE_FILE
 from gfimu.base.files.outputs import RECORDING, RERUN
 from gfimu.commands.shell import completion
 from gfimu.commands.shell.declare import Group, Option
+from gfimu.commands.shell.output_files import PICTURE as PICTURE_FILE
 
 if TYPE_CHECKING:
     from gfimu.recording.importing import ColumnMap

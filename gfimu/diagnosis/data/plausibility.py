@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 from scipy.ndimage import label
 
 from gfimu.base.errors import InputError
-from gfimu.base.units import REFERENCE_UNITS, STANDARD_GRAVITY
+from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.diagnosis.data.faults.wiring import SIGNIFICANT_RMS
 from gfimu.diagnosis.data.reference import REFERENCE_COLUMNS
 from gfimu.diagnosis.data.run import Run
 from gfimu.model.world_model import WorldModel, is_linear, reads_place
+from gfimu.recording.quantities import REFERENCE_UNITS
 
 __all__ = ["NOISE", "REMOVED", "refuse_implausible"]
 

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
 from gfimu.base.errors import InputError
-from gfimu.base.units import TIME_COLUMNS
 from gfimu.diagnosis.data.time_grid import TimeGrid
 from gfimu.model.world_model import WorldModel
 from gfimu.recording import Recording
 from gfimu.recording.importing.guessing.likely_reference import reference_remedy
+from gfimu.recording.quantities import TIME_COLUMNS
 from gfimu.recording.timing.conversion_times import output_data_rate
 from gfimu.recording.timing.reference_times import reference_times
 

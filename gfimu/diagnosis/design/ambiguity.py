@@ -6,7 +6,7 @@ from pathlib import Path
 
 import msgspec
 
-from gfimu.base.errors import InputError
+from gfimu.base.errors import InputError, system_errors
 from gfimu.base.units import is_usable
 from gfimu.model.world_model import Effect, WorldModel
 
@@ -34,10 +34,10 @@ def open_effects(path: str | Path, model: WorldModel) -> list[str | Effect]:
     file = Path(path)
     if file.is_dir():
         file = file / "verdict.json"
+    with system_errors(file, "name a verdict.json or the folder that diagnose wrote"):
+        content = file.read_bytes()
     try:
-        verdict = msgspec.json.decode(file.read_bytes(), type=_Verdict)
-    except OSError as error:
-        raise InputError(f"{file}: {error.strerror}; name a verdict.json or the folder that diagnose wrote") from None
+        verdict = msgspec.json.decode(content, type=_Verdict)
     except (ValueError, RecursionError):
         raise InputError(f"{file}: not a verdict; name the verdict.json that diagnose wrote") from None
     causes = {cause.effect: cause for cause in verdict.causes}

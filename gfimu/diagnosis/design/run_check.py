@@ -13,7 +13,7 @@ from scipy.integrate import cumulative_trapezoid
 
 from gfimu.base.declared import Declared, Table, figure, table
 from gfimu.base.errors import InputError
-from gfimu.base.results import Panel, PlottedResult, Series, text_column
+from gfimu.base.results import Panel, PlottedResult, Series, columns_of, text_column
 from gfimu.diagnosis.data.run import Run, prepare_run
 from gfimu.diagnosis.design.distinguishability import (
     Distinguishability,
@@ -162,12 +162,9 @@ class RunCheck(Declared, PlottedResult):
 
     def to_columns(self) -> dict[str, NDArray[Any]]:
         """Return one row per effect: how well the motion shows it, and what it is confounded with."""
-        return {
-            "effect": text_column(effect.name for effect in self.effects),
-            "detectability": np.array([one.detectability for one in self.effects], dtype=float),
-            "seen": np.array([one.seen for one in self.effects], dtype=bool),
-            "confused_with": text_column(", ".join(one.confused_with) for one in self.effects),
-        }
+        names = {"effect": text_column(effect.name for effect in self.effects)}
+        confused = {"confused_with": text_column(", ".join(effect.confused_with) for effect in self.effects)}
+        return names | columns_of(self.effects, "detectability seen") | confused
 
     def shown(self) -> Iterator[Table | str]:
         """Yield the tables and sentences that people read."""

@@ -8,10 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, FileSystemLoader, select_autoescape
 
 from gfimu.array.array import AccelerometerArray
-from gfimu.base.errors import printable
 from gfimu.base.files.atomic_file import write_text
 from gfimu.base.version import __version__
 from gfimu.diagnosis.criticism.views.residuals import ResidualViews, residual_views
@@ -36,13 +34,14 @@ from gfimu.diagnosis.report.zooming import dependence_plot, residual_plot, spect
 from gfimu.diagnosis.verdict.parts import NamedCause
 from gfimu.diagnosis.verdict.verdict import Diagnosis
 from gfimu.diagnosis.verdict.wording import SAME_SHARE
-from gfimu.visual.page import Packed, page_plots, page_style
+from gfimu.visual.page import Packed, page_plots, page_style, page_text
 from gfimu.visual.page.svg import themed
 from gfimu.visual.rig import package_of
 from gfimu.visual.rig.words import package_words, scene_title
 
 __all__ = ["report_html", "write_report"]
 
+_TEMPLATE = Path(__file__).parent / "templates" / "report.html.j2"
 _VERDICTS = {
     "nothing_found": ("Nothing found", "calm"),
     "explained": ("Explained", "found"),
@@ -82,14 +81,7 @@ def report_html(diagnosis: Diagnosis, rig: DrawnRig | None = None) -> str:
     rig : DrawnRig, optional
         How the array stood on its table; upright at the usual height by default.
     """
-    environment = Environment(
-        loader=FileSystemLoader(Path(__file__).parent / "templates"),
-        autoescape=select_autoescape(default=True, default_for_string=True),
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters["odds"] = odds
-    return printable(environment.get_template("report.html.j2").render(_content(diagnosis, rig or DrawnRig())))
+    return page_text(_TEMPLATE, _content(diagnosis, rig or DrawnRig()), {"odds": odds})
 
 
 def _content(diagnosis: Diagnosis, rig: DrawnRig) -> Mapping[str, Any]:
@@ -104,12 +96,14 @@ def _content(diagnosis: Diagnosis, rig: DrawnRig) -> Mapping[str, Any]:
     if seen:
         plots["residual"] = residual_plot(seen[0], found[0].size, array, data)
     shown = _views(diagnosis, found[0], plots, data) if found else []
+    zooming = page_plots({"plots": plots}, data)
     return {
         "version": __version__,
         "label": label,
         "tone": tone,
         "style": page_style(len(array.chips)),
-        "plots": page_plots({"plots": plots}, data),
+        "policy": zooming["policy"],
+        "plots": zooming,
         "plot_rule": _plot_rule(plots["residual"]["grouped"]) if seen else "",
         "array": _array(diagnosis, rig),
         "headline": headline(diagnosis),

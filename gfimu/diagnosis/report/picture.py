@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from gfimu.base.results.colours import AFTER, BEFORE, COMMAND, MEASURED
 from gfimu.diagnosis.criticism.views.run_view import RunView
 from gfimu.diagnosis.report.plain_words import headline, next_steps, parameter_texts, parameter_units, percent, story
 from gfimu.diagnosis.report.rig import DrawnRig
 from gfimu.diagnosis.verdict.verdict import Diagnosis
 from gfimu.recording import Recording
 from gfimu.visual import KnownMotion, Line, Plot, write_comparison
+from gfimu.visual.colours import AFTER, BEFORE, COMMAND, MEASURED
 
 __all__ = ["write_picture"]
 

@@ -8,11 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gfimu.base.units import NAME, NUMBER, RATIO, STANDARD_GRAVITY, key_name
+from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.diagnosis.criticism.views.run_view import RunView
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.verdict.parts import NamedCause, NoiseLevels
 from gfimu.diagnosis.verdict.verdict import Diagnosis
+from gfimu.model.parameter_units import NAME, NUMBER, RATIO, key_name
 
 __all__ = [
     "ParameterText",

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.base.declared import Declared, figure, plain
+from gfimu.base.declared import Declared, figure
 from gfimu.base.files.atomic_file import write_text
 from gfimu.base.results import Panel, PlottedResult, Series
 from gfimu.base.short_repr import joined
@@ -198,7 +198,7 @@ class Diagnosis(Declared, PlottedResult):
 
     def to_json(self) -> str:
         """Return ``verdict.json``; NaN becomes null."""
-        return json.dumps(plain(self.to_dict()), indent=2, allow_nan=False) + "\n"
+        return json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n"
 
     def write(self, directory: str | Path) -> None:
         """Write ``verdict.json`` and ``twin.toml`` into a folder."""

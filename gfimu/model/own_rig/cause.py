@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from gfimu.array.array import AccelerometerArray
 from gfimu.base.errors import InputError
-from gfimu.base.units import NAME, RATIO, STANDARD_GRAVITY
+from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.model.generic_basis import OF_READING, UNIT_KEYS, Motion, basis_function, is_of_time, unit_parameters
 from gfimu.model.own_rig.places import Pattern, Size, channel_patterns
+from gfimu.model.parameter_units import NAME, RATIO
 from gfimu.model.world_model import BasisUnits, SpinState
 
 __all__ = ["Cause", "Moment", "Parameter", "Presence", "UnnamedCause", "bias_cause", "gain_cause"]

@@ -12,9 +12,10 @@ from gfimu.base.errors import InputError, naming, unknown_name
 from gfimu.base.files.input_file import is_ordinary
 from gfimu.base.files.model_files import read_toml
 from gfimu.base.files.schema import Table, about, read
-from gfimu.base.plugins import plugins, user_function
+from gfimu.base.plugins import plugins
 from gfimu.model.own_rig.cause import UnnamedCause
 from gfimu.model.own_rig.simulator import SimulatorModel
+from gfimu.model.user_code import user_function
 from gfimu.model.world_model import Effect, WorldModel
 
 __all__ = ["load_model"]

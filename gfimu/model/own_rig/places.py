@@ -21,7 +21,7 @@ class Size:
     key : str
         Name of the coordinate, ending in its unit where it has one.
     unit : str
-        The unit as people read it, such as ``"m/s²"``; `gfimu.base.units.RATIO` for a small relative number.
+        The unit as people read it, such as ``"m/s²"``; `gfimu.model.parameter_units.RATIO` for a small relative number.
     prior_std : float
         Size that would surprise nobody in the field, in that unit.
     positive : bool

@@ -14,7 +14,7 @@ from gfimu.array.kinematics import pseudo_inverse
 from gfimu.array.parts.limits import PartLimits
 from gfimu.base.declared import Declared, Line, Table, figure
 from gfimu.base.errors import InputError
-from gfimu.base.results import Panel, PlottedResult
+from gfimu.base.results import Panel, PlottedResult, Series, axis_series
 from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.motion.estimate import Estimate
 from gfimu.motion.impact.channel_class import channel_filter
@@ -25,6 +25,8 @@ from gfimu.recording import Recording
 __all__ = ["Impact", "ImpactSettings", "measure_impact", "time_zero"]
 
 _HIC_S = 0.015
+_DRAWN_BEFORE_S, _DRAWN_DURATIONS, _DRAWN_S = 0.005, 3.0, 0.02
+"""Of the picture: time before time zero, and after it in durations of the impact, and at least."""
 _NEAR_END = 0.98  # share of a channel's range
 
 
@@ -131,7 +133,17 @@ class Impact(Declared, PlottedResult):
         return self.warnings
 
     def _panels(self) -> list[Panel]:
-        return self.motion._panels()[:3]
+        motion = self.motion
+        shown = (motion.t_s >= -_DRAWN_BEFORE_S) & (motion.t_s <= max(_DRAWN_DURATIONS * self.duration_s, _DRAWN_S))
+        panels = []
+        for title, label, values in (
+            ("specific force of the origin", "p, g", motion.p[shown] / STANDARD_GRAVITY),
+            ("angular acceleration", "α, rad/s²", motion.alpha[shown]),
+            ("angular rate", "ω, rad/s", motion.omega[shown]),
+        ):
+            series = (Series("resultant", np.linalg.norm(values, axis=1), role="noise"), *axis_series(values))
+            panels.append(Panel(title, label, series, motion.t_s[shown], shaded=(0.0, self.duration_s)))
+        return panels
 
 
 def time_zero(changes: NDArray[np.float64], threshold: float) -> int:

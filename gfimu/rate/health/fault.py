@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.base.declared import Declared, figure, plain
+from gfimu.base.declared import Declared, figure
 from gfimu.base.short_repr import short_repr
 
 __all__ = ["ChannelFault", "ChannelHealth", "FaultEntry", "HealthCode"]
@@ -72,18 +72,13 @@ class ChannelFault(Declared):
 
     __repr__ = short_repr
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the fault as JSON can hold it, with units in the names; None where a figure is not known."""
-        return plain(super().to_dict())
-
     def entries(self) -> list[dict[str, Any]]:
         """Return a `FaultEntry` for each channel, as JSON can hold it; ``end_s`` is None where it lasts to the end."""
         times = self.onset_s, self.found_s, self.end_s
         last = "m/s2", self.excluded, self.alternatives
         rows = zip(self.channels, self.sizes, self.sizes_std, strict=True)
         return [
-            plain(FaultEntry(name, self.kind, self.isolated, *times, size, std, *last).to_dict())
-            for name, size, std in rows
+            FaultEntry(name, self.kind, self.isolated, *times, size, std, *last).to_dict() for name, size, std in rows
         ]
 
     def sentence(self) -> str:

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from gfimu.array.array import AccelerometerArray
 from gfimu.array.kinematics import omega_products
 from gfimu.array.parts.limits import PartLimits
-from gfimu.base.units import GYRO_COLUMNS, REFERENCE_UNITS, reference_quantity
 from gfimu.recording.evidence.rigid import Matrices, product_slopes, rates_of
+from gfimu.recording.quantities import GYRO_COLUMNS, REFERENCE_UNITS, reference_quantity
 from gfimu.recording.recording import Recording
 
 __all__ = ["OddRate", "RatePolicy", "odd_rates"]

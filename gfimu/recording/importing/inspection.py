@@ -13,9 +13,7 @@ from numpy.typing import NDArray
 
 from gfimu.base.declared import Declared, figure
 from gfimu.base.errors import InputError, one_line
-from gfimu.base.files.table import ArrowStream
-from gfimu.base.results import TableResult, text_column
-from gfimu.base.units import REFERENCE_UNITS, TIME_COLUMNS, reference_quantity
+from gfimu.base.results import TableResult, columns_of, text_column
 from gfimu.recording.importing.clock import Times, times_of
 from gfimu.recording.importing.column_map import ColumnMap, TextSpec, TimeSpec, map_toml
 from gfimu.recording.importing.guessing.likely_reference import likely_references
@@ -25,6 +23,8 @@ from gfimu.recording.importing.raw_table import RawFile, RawTable
 from gfimu.recording.importing.readers import read_foreign
 from gfimu.recording.importing.readers.tables import table_file
 from gfimu.recording.importing.recognise import fitting_maps, own_chips
+from gfimu.recording.quantities import REFERENCE_UNITS, TIME_COLUMNS, reference_quantity
+from gfimu.recording.tables.arrow import ArrowStream
 
 __all__ = ["ColumnView", "Inspection", "inspect_file"]
 
@@ -95,14 +95,8 @@ class Inspection(Declared, TableResult):
 
     def to_columns(self) -> dict[str, NDArray[Any]]:
         """Return one row per column of the file: range, median, missing values, and what it seems to be."""
-        numbers = {
-            key: np.array([getattr(one, key) for one in self.columns]) for key in ("least", "median", "most", "missing")
-        }
-        return {
-            "column": text_column(column.name for column in self.columns),
-            **numbers,
-            "role": text_column(one.role for one in self.columns),
-        }
+        names = {"column": text_column(column.name for column in self.columns)}
+        return names | columns_of(self.columns, "least median most missing role")
 
     def _heading(self) -> str:
         return f"Inspection of {self.source}"

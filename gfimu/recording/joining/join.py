@@ -13,12 +13,12 @@ from scipy.interpolate import CubicSpline
 from gfimu.base.declared import Declared, Table, figure
 from gfimu.base.errors import InputError
 from gfimu.base.results import Panel, PlottedResult, Series, text_column
-from gfimu.base.units import TIME_COLUMNS
 from gfimu.recording.importing.oddities import rails_of
 from gfimu.recording.importing.piece import nearest_rows
 from gfimu.recording.joining.alignment import align
 from gfimu.recording.joining.reference_file import ReferenceSeries
 from gfimu.recording.joining.signals import Alignment, Signals, functions_of, smooth, uniform
+from gfimu.recording.quantities import TIME_COLUMNS
 from gfimu.recording.recording import Recording
 
 __all__ = ["FAR", "Joined", "grids", "join_reference"]

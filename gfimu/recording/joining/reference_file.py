@@ -12,12 +12,12 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
 from gfimu.base.errors import InputError
-from gfimu.base.files.column_file import open_columns
 from gfimu.base.files.input_file import is_there
-from gfimu.base.units import GYRO_COLUMNS, REFERENCE_UNITS
 from gfimu.recording.importing import ColumnMap, load_map
 from gfimu.recording.importing.recognise import map_hint
 from gfimu.recording.mapped import mapped_reference
+from gfimu.recording.quantities import GYRO_COLUMNS, REFERENCE_UNITS
+from gfimu.recording.tables.column_file import open_columns
 
 __all__ = ["ReferenceSeries", "open_reference"]
 

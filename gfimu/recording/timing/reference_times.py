@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.base.units import TIME_COLUMNS
+from gfimu.recording.quantities import TIME_COLUMNS
 from gfimu.recording.recording import Recording
 
 __all__ = ["reference_on_rows", "reference_series", "reference_times"]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from gfimu.base.results.colours import PAGE, TONES, chip_colour, css
+from gfimu.base.results.colours import chip_colour, css
+from gfimu.visual.colours import PAGE, TONES
 
 __all__ = ["STILL_POLICY", "page_basics", "page_style"]
 

@@ -13,7 +13,8 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from PIL import Image
 
-from gfimu.base.results.colours import INK, NOISE_ON_PAPER, PAGE, chip_colour, css
+from gfimu.base.results.colours import INK, NOISE_ON_PAPER, chip_colour, css
+from gfimu.visual.colours import PAGE
 
 __all__ = ["GRID", "ON_PAGE", "svg_text", "themed"]
 

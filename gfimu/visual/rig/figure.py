@@ -13,7 +13,8 @@ from scipy.spatial import ConvexHull, QhullError
 
 from gfimu.array.array import AccelerometerArray
 from gfimu.array.turning_axis import TurningAxis
-from gfimu.base.results.colours import AXES, INK, METAL, NOISE_ON_PAPER, SPIN_AXIS_ON_PAPER, STYLES, chip_colour, css
+from gfimu.base.results.colours import INK, NOISE_ON_PAPER, SPIN_AXIS_ON_PAPER, STYLES, chip_colour, css
+from gfimu.visual.colours import AXES, METAL
 from gfimu.visual.rig.package import Package, drawing_size, package_of
 from gfimu.visual.rig.words import short_name
 

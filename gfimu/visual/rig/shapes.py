@@ -10,7 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from gfimu.array.array import AccelerometerArray
 from gfimu.array.turning_axis import TurningAxis
-from gfimu.base.results.colours import AXES, ESTIMATE, GRAVITY, METAL, SPIN_AXIS, TABLE, chip_colour
+from gfimu.base.results.colours import chip_colour
+from gfimu.visual.colours import AXES, ESTIMATE, GRAVITY, METAL, SPIN_AXIS, TABLE
 from gfimu.visual.rig.package import chip_half_size, drawing_size, is_cube, package_of
 from gfimu.visual.scene import Box, Cylinder, Names, Pointers, Shape
 

@@ -10,7 +10,7 @@ from typing import Any
 import msgspec
 
 from gfimu.base.errors import InputError
-from gfimu.base.plugins import user_function
+from gfimu.model.user_code import user_function
 from sim.trials.benchmark.answer import Answer, answer_of
 from sim.trials.benchmark.real import real_task
 from sim.trials.benchmark.release import MEASURED, RELEASE, cases, find_case

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gfimu.base.errors import InputError
-from gfimu.base.units import KEY_ENDINGS
+from gfimu.model.parameter_units import KEY_ENDINGS
 from sim.effects import EFFECTS, Effect, make_effect
 
 if TYPE_CHECKING:

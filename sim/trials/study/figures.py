@@ -8,24 +8,21 @@ from typing import Any
 
 import numpy as np
 
+from gfimu.base.results import save_figure
+
 __all__ = ["draw_confusion", "draw_detection", "draw_reliability"]
 
 
 def _axes(width: float, height: float) -> tuple[Any, Any]:
-    import matplotlib as mpl
+    from matplotlib.figure import Figure
 
-    mpl.use("Agg")
-    import matplotlib.pyplot as plt
-
-    return plt.subplots(figsize=(width, height), layout="constrained")
+    figure = Figure(figsize=(width, height), layout="constrained")
+    return figure, figure.subplots()
 
 
 def _save(figure: Any, path: Path) -> Path:
-    import matplotlib.pyplot as plt
-
     path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=120, metadata={"Software": None})
-    plt.close(figure)
+    save_figure(path, figure)
     return path
 
 

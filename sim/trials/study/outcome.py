@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 
 from gfimu.array.array import AccelerometerArray
-from gfimu.base.plugins import user_function
 from gfimu.base.short_repr import short_repr
 from gfimu.base.units import MILLI_G
 from gfimu.diagnosis.design.distinguishability import energy_left, normal_equations, plan_contenders
 from gfimu.diagnosis.design.planned_run import PlannedRun, planned
 from gfimu.diagnosis.verdict.library import standing_out
 from gfimu.diagnosis.verdict.verdict import Diagnosis
+from gfimu.model.user_code import user_function
 from gfimu.recording import Recording
 from sim.effects import Effect, make_effect
 from sim.motions.motion import SpinMotion

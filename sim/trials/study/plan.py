@@ -14,7 +14,7 @@ import msgspec
 import numpy as np
 
 from gfimu.base.errors import InputError
-from gfimu.base.plugins import user_function
+from gfimu.model.user_code import user_function
 from sim.trials.study.baselines import run_baseline
 from sim.trials.study.blame import blame_of, is_miss
 from sim.trials.study.cases import find_case, study_cases

@@ -12,7 +12,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from gfimu.base.results.colours import AFTER_ON_PAPER, BEFORE_ON_PAPER, INK, NOISE_ON_PAPER, css
-from gfimu.base.units import KEY_ENDINGS
+from gfimu.model.parameter_units import KEY_ENDINGS
 from sim.trials.sweep.design import Design
 from sim.trials.sweep.plan import RangeTable
 from sim.trials.sweep.sensitivity import Sensitivity

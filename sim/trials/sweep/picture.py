@@ -12,7 +12,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from gfimu.base.errors import InputError, unknown_name
-from gfimu.base.files.atomic_file import atomic_path, write_text
+from gfimu.base.files.atomic_file import write_text
+from gfimu.base.results import save_figure
 from gfimu.base.results.colours import INK, css
 from sim.trials.sweep.design import Design
 from sim.trials.sweep.page import campaign_page
@@ -68,13 +69,8 @@ def campaign_picture(
         return drawn
     with mpl.rc_context(_STYLE):
         figure = _figure(f"{folder.name}: {len(table)} of {len(design)} cases", table, design, drawn, len(there))
-        with atomic_path(path) as part:
-            figure.savefig(part, dpi=120, format=Path(path).suffix.lstrip("."), metadata=_metadata(path))
+        save_figure(path, figure)
     return drawn
-
-
-def _metadata(path: str | Path) -> dict[str, None]:
-    return {"Date": None} if Path(path).suffix.lower() != ".png" else {}
 
 
 def _figure(title: str, table: pa.Table, design: Design, results: list[str], all_results: int) -> Figure:

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from gfimu.base.declared import Declared, Line, Table, figure
 from gfimu.base.files.atomic_file import atomic_path
-from gfimu.base.files.table import as_found
 from gfimu.base.results import Panel, PlottedResult, Series, TableResult, one_row, text_column
 from gfimu.base.units import duration_text
+from gfimu.recording.tables.arrow import as_found
 from sim.trials.sweep.dataset import Dataset
 from sim.trials.sweep.pace import Run
 from sim.trials.sweep.sensitivity import METHODS, Sensitivity

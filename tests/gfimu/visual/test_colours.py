@@ -13,9 +13,24 @@ import numpy as np
 import pytest
 from every_item import every
 
-from gfimu.base import chip_colour, css
-from gfimu.base.results.colours import AFTER, AFTER_ON_PAPER, BEFORE, BEFORE_ON_PAPER, SEPARATED
+from gfimu.base.results.colours import (
+    AFTER_ON_PAPER,
+    AXES_ON_PAPER,
+    BEFORE_ON_PAPER,
+    INK,
+    NOISE_ON_PAPER,
+    chip_colour,
+    css,
+)
+from gfimu.visual.colours import AFTER, AXES, BEFORE, COMMAND, ESTIMATE, MEASURED, TACHO, TRUTH
 
+SEPARATED = {  # colours of one picture that a reader has to distinguish, by picture
+    "run": {"truth": TRUTH, "estimate": ESTIMATE, "tacho": TACHO, "command": COMMAND},
+    "body axes": dict(zip("xyz", AXES, strict=True)),
+    "body axes on paper": dict(zip("xyz", AXES_ON_PAPER, strict=True)),
+    "comparison": {"measured": MEASURED, "before": BEFORE, "after": AFTER},
+    "report": {"noise": NOISE_ON_PAPER, "before": BEFORE_ON_PAPER, "after": AFTER_ON_PAPER, "ink": INK},
+}
 VISION = {
     "normal": np.eye(3),
     "protanopia": np.array(

@@ -10,10 +10,9 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from gfimu.base import PAGE, chip_colour
-from gfimu.base.results.colours import TONES
-from gfimu.visual import Packed, page_plots
-from gfimu.visual.page import enveloped
+from gfimu.base.results.colours import chip_colour
+from gfimu.visual.colours import PAGE, TONES
+from gfimu.visual.page import Packed, enveloped, page_plots
 
 
 def unpacked(data: Packed) -> list[np.ndarray]:

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.base.errors import InputError
-from gfimu.base.files.input_file import parsing
 from gfimu.base.files.memory import MemoryLimit
 from gfimu.base.optional_packages import require
 from gfimu.recording.importing.column_map import TextSpec
 from gfimu.recording.importing.raw_table import RawFile
 from gfimu.recording.importing.readers.matrices import gather, is_gathered, tables_by_length
+from gfimu.recording.reading import parsing
 
 __all__ = ["read_hdf5"]
 

@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 
 from gfimu.base.errors import InputError
-from gfimu.base.files.input_file import MOST_COLUMNS, parsing
 from gfimu.base.files.memory import MemoryLimit
 from gfimu.base.optional_packages import require
 from gfimu.recording.importing.column_map import TextSpec
 from gfimu.recording.importing.raw_table import RawFile, RawTable
+from gfimu.recording.reading import MOST_COLUMNS, parsing
 
 __all__ = ["IMU_COLUMNS", "read_bag", "read_mcap", "read_ulog"]
 

@@ -19,12 +19,13 @@ from numpy.typing import NDArray
 
 from gfimu.base.child_process import run_module
 from gfimu.base.errors import InputError
-from gfimu.base.files.input_file import as_path, parsing
+from gfimu.base.files.input_file import as_path
 from gfimu.base.files.memory import MemoryLimit, with_memory
 from gfimu.recording.importing.column_map import TextSpec
 from gfimu.recording.importing.raw_table import RawFile
 from gfimu.recording.importing.readers.hdf5 import read_hdf5
 from gfimu.recording.importing.readers.matrices import gather, tables_by_length
+from gfimu.recording.reading import parsing
 
 __all__ = ["read_matlab"]
 

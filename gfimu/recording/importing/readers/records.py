@@ -15,12 +15,12 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from gfimu.base.errors import InputError
-from gfimu.base.files.input_file import parsing, read_bytes
 from gfimu.base.files.memory import MemoryLimit, MemoryLimitError
 from gfimu.base.optional_packages import require
 from gfimu.recording.importing.column_map import TextSpec
 from gfimu.recording.importing.raw_table import RawFile, RawTable
 from gfimu.recording.importing.readers.text import GROWS, cell_values, table_of_text
+from gfimu.recording.reading import parsing, read_bytes
 
 __all__ = ["is_workbook", "read_excel", "read_json"]
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from gfimu.base.errors import InputError, unknown_name
-from gfimu.base.files.input_file import as_path, check_input
+from gfimu.base.files.input_file import as_path, first_bytes
 from gfimu.base.plugins import plugins
 from gfimu.recording.importing.column_map import TextSpec
 from gfimu.recording.importing.raw_table import RawFile
@@ -75,12 +75,7 @@ def format_of(path: Path) -> str:
         if (path / "metadata.yaml").is_file():
             return "rosbag"
         raise InputError(f"{path}: a folder that is no ROS 2 bag; give a file")
-    check_input(path)
-    try:
-        with path.open("rb") as stream:
-            head = stream.read(4096)
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror or error}; check the path") from None
+    head = first_bytes(path, 4096)
     if not head:
         raise InputError(f"{path}: empty file; record again or give another file")
     known = readers()

@@ -13,14 +13,14 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from gfimu.base.errors import InputError
-from gfimu.base.files.column_file import open_parquet
-from gfimu.base.files.input_file import parsing
 from gfimu.base.files.memory import MemoryLimit, MemoryLimitError
-from gfimu.base.files.table import as_found
-from gfimu.base.files.table_columns import TableColumns
 from gfimu.recording.importing.column_map import TextSpec
 from gfimu.recording.importing.raw_table import RawFile, RawTable
 from gfimu.recording.importing.readers.text import GROWS, table_of_text
+from gfimu.recording.reading import parsing
+from gfimu.recording.tables.arrow import as_found
+from gfimu.recording.tables.column_file import open_parquet
+from gfimu.recording.tables.table_columns import TableColumns
 
 __all__ = ["read_archive", "read_parquet", "table_file"]
 

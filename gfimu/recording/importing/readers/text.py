@@ -15,13 +15,13 @@ import pyarrow.csv as pa_csv
 from numpy.typing import NDArray
 
 from gfimu.base.errors import InputError
-from gfimu.base.files.input_file import MOST_COLUMNS, read_bytes
 from gfimu.base.files.memory import MemoryLimit
-from gfimu.base.files.table import as_found
 from gfimu.recording.importing.column_map import TextSpec
 from gfimu.recording.importing.raw_table import RawFile, RawTable
 from gfimu.recording.importing.readers.text_layout import COMMENT_MARKS, Layout, layout_of
 from gfimu.recording.importing.readers.text_lines import plain_lines
+from gfimu.recording.reading import MOST_COLUMNS, read_bytes
+from gfimu.recording.tables.arrow import as_found
 
 __all__ = ["GROWS", "cell_values", "is_text", "read_text", "table_of_text"]
 

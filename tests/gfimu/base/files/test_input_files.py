@@ -12,10 +12,11 @@ from pathlib import Path
 
 import pytest
 
-from gfimu import InputError
-from gfimu.base import MemoryLimit, read_bytes
-from gfimu.base.files.input_file import check_input, is_ordinary, parsing, unpacked
+from gfimu.base.errors import InputError
+from gfimu.base.files.input_file import check_input, is_ordinary
+from gfimu.base.files.memory import MemoryLimit
 from gfimu.base.files.model_files import parse_toml
+from gfimu.recording.reading import parsing, read_bytes, unpacked
 
 
 def test_ordinary_files_only(tmp_path):
@@ -108,7 +109,7 @@ def listening(session: int) -> list[str]:
 @pytest.mark.parametrize("mode", [["--serve-grpc"], ["--web-viewer", "--web-viewer-port", "19881"]])
 def test_the_viewer_listens_on_this_machine_only(mode):
     pytest.importorskip("rerun")
-    from gfimu.base.files.rerun_stream import viewer_command
+    from gfimu.visual.viewer import viewer_command
 
     wanted = len(mode) // 2 + 1
     command = viewer_command(*mode, "--port", "19880")
@@ -127,7 +128,7 @@ def test_the_viewer_listens_on_this_machine_only(mode):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 def test_the_virtual_port_listens_on_this_machine_only():
-    from firmware_bridge import TcpPort
+    from firmware_bridge.loop.virtual_port import TcpPort
 
     before = set(listening(os.getsid(0)))
     port = TcpPort(0)

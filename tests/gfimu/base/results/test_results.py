@@ -110,11 +110,17 @@ def test_pictures_open_no_window_and_stay_in_no_register(results):
     assert plt.get_backend().lower() == "agg"
 
 
+def test_a_picture_is_written_below_the_heading(results, tmp_path):
+    results["RecordingNoise"].to_picture(tmp_path / "noise.svg")
+    assert "<!-- Noise at rest" in (tmp_path / "noise.svg").read_text(encoding="utf-8")
+    assert [file.name for file in tmp_path.iterdir()] == ["noise.svg"]
+
+
 def test_a_library_picture_leaves_the_backend_alone(tmp_path):
     import subprocess
 
     code = (
-        "import os; os.environ['MPLBACKEND'] = 'svg'; import matplotlib as mpl; import gfimu.sensor_noise.pictures; "
+        "import os; os.environ['MPLBACKEND'] = 'svg'; import matplotlib as mpl; import gfimu.base.results.figure; "
         "import gfimu.calibration.pictures; import gfimu.budget.tolerances.picture; "
         "assert mpl.get_backend().lower() == 'svg'"
     )

@@ -10,8 +10,9 @@ import pytest
 from headless_browser import headless_browser
 from made_diagnoses import made_diagnosis
 
-from gfimu.base import PAGE, chip_colour
-from gfimu.diagnosis import report_html
+from gfimu.base.results.colours import chip_colour
+from gfimu.diagnosis.report.page import report_html
+from gfimu.visual.colours import PAGE
 
 READY = "document.documentElement.dataset.ready === 'true'"
 PLOT = "document.querySelector('[data-plot=residual]')"

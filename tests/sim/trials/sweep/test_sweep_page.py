@@ -9,8 +9,10 @@ import pyarrow as pa
 import pytest
 from headless_browser import headless_browser
 
-from gfimu.base import PAGE
-from sim.trials import Design, campaign_picture, load_plan
+from gfimu.visual.colours import PAGE
+from sim.trials.sweep.design import Design
+from sim.trials.sweep.picture import campaign_picture
+from sim.trials.sweep.plan import load_plan
 
 PLAN = """
 design = "random"

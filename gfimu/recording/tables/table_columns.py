@@ -11,13 +11,13 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from gfimu.base.errors import InputError
-from gfimu.base.files.table import ArrowStream, arrow_column, metadata_of_schema, numbers
+from gfimu.recording.tables.arrow import ArrowStream, arrow_column, metadata_of_schema, numbers
 
 __all__ = ["TableColumns"]
 
 
 class TableColumns:
-    """An open table: its column names, metadata and columns (see `gfimu.base.files.column_file.ColumnFile`).
+    """An open table: its column names, metadata and columns (see `gfimu.recording.tables.column_file.ColumnFile`).
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a file's schema says, for people and editors: its tables key by key, and its JSON schema."""
+"""What the schema of a file says, for people: its tables key by key."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from msgspec import inspect as types
 
 from gfimu.base.files.schema import tagged, without_none
 
-__all__ = ["KeyRow", "TableRows", "json_schema", "table_rows"]
+__all__ = ["KeyRow", "TableRows", "table_rows"]
 
 
 @dataclass(frozen=True)
@@ -61,40 +61,6 @@ def table_rows(kind: type[msgspec.Struct]) -> list[TableRows]:
     info = types.type_info(kind)
     assert isinstance(info, types.StructType)
     return list(_tables(info, "", _Head()))
-
-
-def json_schema(kind: type[msgspec.Struct], title: str) -> str:
-    """Return the JSON schema of a kind of file, by which an editor completes and checks it."""
-    found = msgspec.json.schema(kind)
-    definitions = found["$defs"]
-    definitions[kind.__name__]["title"] = title
-    for schema in definitions.values():
-        schema["description"] = _unmarked(schema.get("description", "").partition("\n")[0])
-        for value in schema["properties"].values():
-            _release_tag(value, definitions)
-    _without_prefix_items(found)
-    return json.dumps({"$schema": "http://json-schema.org/draft-07/schema#", **found}, indent=1) + "\n"
-
-
-def _release_tag(value: Mapping[str, Any], definitions: Mapping[str, Any]) -> None:
-    """Let the tag of a table with a default be left out."""
-    choice, default = value.get("discriminator", {}), value.get("default")
-    if choice and isinstance(default, dict):
-        tag = choice["propertyName"]
-        chosen = definitions[choice["mapping"][default[tag]].rpartition("/")[2]]
-        chosen["required"] = [key for key in chosen["required"] if key != tag]
-
-
-def _without_prefix_items(value: Any) -> None:
-    """Write lists of a fixed length as older drafts of JSON schema do, which most editors know."""
-    if isinstance(value, dict):
-        if "prefixItems" in value:
-            value["items"] = value.pop("prefixItems")[0]
-        for one in value.values():
-            _without_prefix_items(one)
-    elif isinstance(value, list):
-        for one in value:
-            _without_prefix_items(one)
 
 
 @dataclass(frozen=True)

@@ -11,11 +11,12 @@ import time
 import pytest
 
 from firmware_bridge.host.live import LiveView
-from gfimu import AccelerometerArray, GfimuError
-from gfimu.base.files import rerun_stream
-from gfimu.base.files.rerun_stream import rrd_stream, viewer_command, viewer_stream
+from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import GfimuError
+from gfimu.base.files.rerun_stream import rrd_stream
 from gfimu.visual import viewer
 from gfimu.visual.live import LivePicture
+from gfimu.visual.viewer import viewer_command, viewer_stream
 
 
 @pytest.fixture
@@ -86,7 +87,7 @@ def test_remedies_say_so_too(picture, monkeypatch):
     monkeypatch.delenv("DISPLAY")
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     monkeypatch.setattr(sys, "platform", "linux")
-    monkeypatch.setattr(rerun_stream, "_PORT", free_port())
+    monkeypatch.setattr(viewer, "_PORT", free_port())
     with pytest.raises(GfimuError, match=r"rerun --web-viewer --bind 127\.0\.0\.1` first .*--rrd"):
         viewer_stream("test")
     with pytest.raises(GfimuError, match=r"rerun --web-viewer --bind 127\.0\.0\.1 .*look\.rrd"):
@@ -95,8 +96,8 @@ def test_remedies_say_so_too(picture, monkeypatch):
 
 def test_a_viewer_that_does_not_start_is_one_line(monkeypatch):
     monkeypatch.setenv("DISPLAY", ":0")
-    monkeypatch.setattr(rerun_stream, "_PORT", free_port())
-    monkeypatch.setattr(rerun_stream, "viewer_command", lambda *_: [sys.executable, "-c", "raise SystemExit(3)"])
+    monkeypatch.setattr(viewer, "_PORT", free_port())
+    monkeypatch.setattr(viewer, "viewer_command", lambda *_: [sys.executable, "-c", "raise SystemExit(3)"])
     with pytest.raises(GfimuError, match="does not start here"):
         viewer_stream("test")
 
@@ -113,11 +114,9 @@ def test_record_opens_a_viewer_on_this_machine_only(monkeypatch):
     popen = subprocess.Popen
     processes = []
     monkeypatch.setenv("DISPLAY", ":0")
-    monkeypatch.setattr(rerun_stream, "_PORT", port)
-    monkeypatch.setattr(rerun_stream, "viewer_command", command)
-    monkeypatch.setattr(
-        rerun_stream.subprocess, "Popen", lambda *a, **k: processes.append(popen(*a, **k)) or processes[0]
-    )
+    monkeypatch.setattr(viewer, "_PORT", port)
+    monkeypatch.setattr(viewer, "viewer_command", command)
+    monkeypatch.setattr(viewer.subprocess, "Popen", lambda *a, **k: processes.append(popen(*a, **k)) or processes[0])
     try:
         stream = viewer_stream("test")
         stream.flush(timeout_sec=5)
@@ -129,7 +128,7 @@ def test_record_opens_a_viewer_on_this_machine_only(monkeypatch):
         assert len(processes) == 1  # the viewer that is there is used again
     finally:
         for process in processes:
-            rerun_stream._end(process)
+            viewer._end(process)
     end = time.monotonic() + 10.0
     while answers("127.0.0.1", port):
         assert time.monotonic() < end, "the server is left running"

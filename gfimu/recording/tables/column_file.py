@@ -21,9 +21,11 @@ from numpy.typing import NDArray
 
 from gfimu.base.errors import InputError, one_line
 from gfimu.base.files.atomic_file import atomic_path
-from gfimu.base.files.input_file import LONGEST_LINE, MOST_COLUMNS, check_input
+from gfimu.base.files.input_file import check_input, first_bytes
 from gfimu.base.files.memory import JSON_GROWS, MemoryLimit
-from gfimu.base.files.table import (
+from gfimu.base.files.metadata import schema_metadata, to_json
+from gfimu.recording.reading import LONGEST_LINE, MOST_COLUMNS
+from gfimu.recording.tables.arrow import (
     ArrowStream,
     arrow_column,
     as_found,
@@ -31,10 +33,8 @@ from gfimu.base.files.table import (
     from_json,
     metadata_of_schema,
     numbers,
-    schema_metadata,
-    to_json,
 )
-from gfimu.base.files.table_columns import TableColumns
+from gfimu.recording.tables.table_columns import TableColumns
 
 __all__ = ["ColumnFile", "check_columns", "head_line", "open_columns", "open_parquet", "write_columns"]
 
@@ -85,11 +85,7 @@ def open_columns(source: str | Path | ArrowStream | ColumnFile) -> ColumnFile:
     if not isinstance(source, str | Path):
         return source if isinstance(source, TableColumns) else TableColumns(source)
     file = check_input(source)
-    try:
-        with file.open("rb") as stream:
-            magic = stream.read(4)
-    except OSError as error:
-        raise InputError(f"{file}: {error.strerror or error}; check the path") from None
+    magic = first_bytes(file, 4)
     if not magic:
         raise InputError(f"{file}: empty file; record again or give another file")
     table: ColumnFile = _ParquetColumns(file) if magic == b"PAR1" else _CsvColumns(file)

@@ -13,17 +13,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-__all__ = [
-    "ArrowStream",
-    "arrow_column",
-    "as_found",
-    "column_type",
-    "from_json",
-    "metadata_of_schema",
-    "numbers",
-    "schema_metadata",
-    "to_json",
-]
+__all__ = ["ArrowStream", "arrow_column", "as_found", "column_type", "from_json", "metadata_of_schema", "numbers"]
 
 _FOREIGN_METADATA = {"ARROW:schema", "pandas"}
 _PANDAS_ATTRS = "PANDAS_ATTRS"
@@ -41,16 +31,6 @@ class ArrowStream(Protocol):
 def column_type(values: NDArray[Any]) -> pa.DataType:
     """Return the Arrow type of a column."""
     return pa.array(values).type if values.dtype == object else pa.from_numpy_dtype(values.dtype)
-
-
-def schema_metadata(metadata: Mapping[str, Any]) -> dict[bytes, bytes]:
-    """Return metadata as the schema of an Arrow table or a Parquet file holds them."""
-    return {key.encode(): to_json(value).encode() for key, value in metadata.items()}
-
-
-def to_json(value: Any) -> str:
-    """JSON of a metadata value; NumPy arrays and numbers as lists and numbers."""
-    return json.dumps(value, default=lambda item: item.tolist() if hasattr(item, "tolist") else str(item))
 
 
 def from_json(text: str) -> Any:
