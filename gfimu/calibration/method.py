@@ -1,10 +1,12 @@
-"""What a calibration method is, and what it works on."""
+"""What a calibration method is, what it works on, and the call that calibrates by one."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
+
+import numpy as np
 
 from gfimu.array.array import AccelerometerArray
 from gfimu.base.units import STANDARD_GRAVITY
@@ -12,7 +14,7 @@ from gfimu.calibration.given import RateTable
 from gfimu.calibration.result import Calibration
 from gfimu.recording import Recording
 
-__all__ = ["CalibrationMethod", "CalibrationTask"]
+__all__ = ["CalibrationMethod", "CalibrationTask", "run_calibration"]
 
 
 @dataclass(frozen=True)
@@ -116,3 +118,27 @@ class CalibrationTask:
     rate_table: RateTable | None = None
     wavelet: Mapping[str, Any] = field(default_factory=dict)
     progress: Callable[[float], object] | None = None
+
+
+def run_calibration(method: CalibrationMethod, task: CalibrationTask) -> Calibration:
+    """Calibrate by the record of a method.
+
+    Raises
+    ------
+    InputError
+        If the data are faulty, or the poses don't suffice.
+    """
+    result = method.run(method, task)
+    return replace(result, statistics={**result.statistics, **_temperature_statistics(task.recording)})
+
+
+def _temperature_statistics(recording: Recording) -> dict[str, float]:
+    """Return mean and span of the temperature at which a recording was made; empty if it has none.
+
+    Sensitivity and bias hold at that temperature: a condition of the calibration.
+    """
+    temperature = recording.reference.get("temperature_degC")
+    seen = np.empty(0) if temperature is None else temperature[np.isfinite(temperature)]
+    if not len(seen):
+        return {}
+    return {"temperature_mean_degC": float(seen.mean()), "temperature_span_K": float(np.ptp(seen))}

@@ -232,7 +232,7 @@ def calibrate(
     from gfimu.base.units import STANDARD_GRAVITY
     from gfimu.calibration.check_poses import check_on_poses
     from gfimu.calibration.given import CalibrationPoses, CalibrationPrior, RateTable
-    from gfimu.calibration.methods import CalibrationTask, run_calibration
+    from gfimu.calibration.method import CalibrationTask, run_calibration
     from gfimu.calibration.registry import calibration_method
     from gfimu.commands.opened import as_array, as_run, as_source, name_of
     from gfimu.recording.checks import examine

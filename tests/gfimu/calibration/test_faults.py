@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from calibration_cases import FACES, GRAVITY, MULTI
+from calibration_cases import FACES, GRAVITY, MULTI, calibrate
 from recordings import pose_recording
 
 from gfimu.base.errors import InputError
-from gfimu.calibration.methods import METHODS, calibrate
 from gfimu.calibration.observations import averaged_poses, denoised_samples, every_sample, observations_from
+from gfimu.calibration.registry import METHODS
 from gfimu.recording import Recording
 from gfimu.recording.rest import detect_rest
 

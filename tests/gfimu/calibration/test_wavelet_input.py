@@ -7,7 +7,7 @@ from calibration_cases import GRAVITY, MULTI
 from recordings import pose_recording
 
 from gfimu import InputError, Recording
-from gfimu.calibration.methods import CalibrationTask, run_calibration
+from gfimu.calibration.method import CalibrationTask, run_calibration
 from gfimu.calibration.observations import THRESHOLDS, denoised_samples, every_sample, observations_from
 from gfimu.calibration.registry import METHODS
 from gfimu.recording.rest import Rest
