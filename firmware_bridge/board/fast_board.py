@@ -245,10 +245,10 @@ class FastBoard(Board):
     """
 
     _cpu_class = _FastCpu
+    handle: Any = None
 
     def __init__(self, image: ElfImage, sensors: Sequence[Adxl345] = ()) -> None:
         self.native = _library()
-        self.handle: Any = None
         self._early: dict[str, Any] = {}
         super().__init__(image, sensors)
 
@@ -453,6 +453,6 @@ class FastBoard(Board):
         self.native.board_reset(self.handle, self._dividers())
 
     def __del__(self) -> None:
-        if getattr(self, "handle", None) is not None:
+        if self.handle is not None:
             self.native.board_free(self.handle)
             self.handle = None

@@ -131,7 +131,7 @@ class Journal:
         self.samples += lines.count(b"\n")
 
     def _failed(self, error: BaseException) -> JournalError:
-        number = getattr(error, "errno", None)
+        number = error.errno if isinstance(error, OSError) else None
         reason = os.strerror(number) if number else str(error).splitlines()[0]
         left = (
             f"{self.samples} samples are in the file and can be read" if self.samples > 0 else "no sample was written"

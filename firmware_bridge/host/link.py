@@ -123,7 +123,7 @@ class Link:
                 self.port, baudrate=self._baud, timeout=timeout, write_timeout=2.0, exclusive=exclusive
             )
         except (serial.SerialException, OSError, ValueError) as error:
-            number = getattr(error, "errno", None)
+            number = error.errno if isinstance(error, OSError) else None
             if number in _TAKEN:
                 raise InputError(
                     f"{self.port}: the port is in use by another program; end that one (another gfimu record?) first"

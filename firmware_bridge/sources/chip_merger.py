@@ -7,7 +7,6 @@ IEEE Signal Processing Magazine 16(6):22, 1999).
 
 from __future__ import annotations
 
-import importlib
 from typing import Any
 
 import numpy as np
@@ -93,9 +92,10 @@ class ChipMerger:
         self.names = names
         self._chips = [_Chip() for _ in names]
         self._have_begun = False
-        if len(names) > 1:
-            for module in ("scipy.interpolate", "gfimu.recording.importing.piece"):
-                importlib.import_module(module)  # takes seconds, for which no sample should wait
+        if len(names) > 1:  # both take seconds, for which no sample should wait
+            import scipy.interpolate  # noqa: F401
+
+            import gfimu.recording.importing.piece  # noqa: F401
 
     def start_anew(self) -> None:
         """Forget the samples that wait: the stream was broken; the rates stay."""

@@ -2,7 +2,7 @@
 
 In: recordings of poses, a rate table, a spin or any motion; an earlier calibration to update.
 Out: `Calibration` with its covariance, a certificate with its uncertainty budget (`certificate`), files of other
-programs (`exporting`). `registry` lists the methods; `methods` has one call for all.
+programs (`exporting`). `registry` lists the methods; `method` says what one is, and has one call for all.
 """
 
 from typing import TYPE_CHECKING

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from gfimu.base.errors import InputError, unknown_name
 from gfimu.base.files.outputs import OutputFile, OutputFolder
 from gfimu.base.optional_packages import require
+from gfimu.base.plugins import user_function
 from gfimu.commands.shell.declare import Option, command
 from gfimu.commands.shell.options import DATA, LIMIT, SETS, SPLIT, WORKERS
 
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from gfimu.commands.benchmark_results import BenchmarkList, BenchmarkRun, BenchmarkWorlds
     from sim.trials.benchmark.answer import Answer
     from sim.trials.benchmark.judged import Judged
+    from sim.trials.benchmark.methods import Method
     from sim.trials.benchmark.table import Judgement
 
 __all__ = ["benchmark_list", "judge", "methods", "run", "table", "worlds"]
@@ -32,7 +34,6 @@ __all__ = ["benchmark_list", "judge", "methods", "run", "table", "worlds"]
 OWN = "gfimu"
 """Name of the project's own method."""
 
-_OWN_METHOD = "gfimu.commands.benchmark_engine:answer"
 _DRAWN = ("own", "independent", "unlisted", "dcmotor")
 _ANSWERS = "answers.jsonl"
 _SCHEMA = "answer.schema.json"
@@ -40,11 +41,11 @@ _LINES = OutputFile("a file of judged answers", (".jsonl", ".xz"))
 _PROGRESS = Option("Called with the number of worlds that are done and of all.", shell=False)
 
 
-def methods() -> dict[str, str]:
-    """Return the methods that come with the benchmark: name, and the function behind it."""
+def methods() -> tuple[str, ...]:
+    """Return the names of the methods that come with the benchmark."""
     from sim.trials.benchmark.baselines import BASELINES
 
-    return {OWN: _OWN_METHOD, **BASELINES}
+    return (OWN, *BASELINES)
 
 
 def _of_list() -> tuple[type, ...]:
@@ -75,7 +76,7 @@ def benchmark_list() -> "BenchmarkList":
     from gfimu.commands.benchmark_results import BenchmarkList
     from sim.trials.benchmark.release import RELEASE, SETS, release_hash
 
-    return BenchmarkList(RELEASE, release_hash(), tuple(SETS.values()), tuple(methods()))
+    return BenchmarkList(RELEASE, release_hash(), tuple(SETS.values()), methods())
 
 
 def _of_worlds() -> tuple[type, ...]:
@@ -214,7 +215,7 @@ def run(
     require("gfimu benchmark", "mujoco")
     from gfimu.commands.benchmark_results import BenchmarkRun
     from sim.trials.benchmark.answer import write_answers
-    from sim.trials.benchmark.methods import answers_of, benchmark_plan, benchmark_work, load_method
+    from sim.trials.benchmark.methods import answers_of, benchmark_plan, benchmark_work
     from sim.trials.sweep.dataset import Dataset
     from sim.trials.sweep.engine import run_campaign
     from sim.trials.sweep.executors import open_workers, processors
@@ -222,11 +223,10 @@ def run(
     for option, value in (("--workers", workers), ("--limit", limit)):
         if value is not None and value < 1:
             raise InputError(f"{option} {value}: must be at least 1")
-    reference = _reference(method)
-    load_method(reference)  # one that is not there is reported before anything is written
+    reference, own = _named(method)
     dataset = Dataset.create(out, benchmark_plan(reference, _chosen(sets), split, limit, _folder(data)))
-    work = functools.partial(open_workers, workers or processors())
-    run_campaign(dataset, benchmark_work, work, progress=progress)
+    work = functools.partial(benchmark_work, own=own)
+    run_campaign(dataset, work, functools.partial(open_workers, workers or processors()), progress=progress)
     called = name or (method if ".py:" not in method else f"{Path(method.rpartition(':')[0]).stem}")
     answers = answers_of(dataset, called)
     path = dataset.folder / _ANSWERS
@@ -343,14 +343,20 @@ def _complete(path: Path, *, partial: bool) -> "list[Answer]":
     ]
 
 
-def _reference(method: str) -> str:
-    """Return a method as the workers load it: the path of a file in full."""
-    if method in methods():
-        return methods()[method]
+def _named(method: str) -> "tuple[str, Method | None]":
+    """Return how the plan names a method, a file in full, and the function of one that comes with the benchmark."""
+    from gfimu.commands.benchmark_engine import answer
+    from sim.trials.benchmark.baselines import baselines
+
+    own = {OWN: answer, **baselines()}.get(method)
+    if own is not None:
+        return f"{own.__module__}:{own.__name__}", own
     file, colon, function = method.rpartition(":")
     if not colon or not file.endswith(".py"):
         raise unknown_name("method", method, methods())
-    return f"{Path(file).resolve()}:{function}"
+    reference = f"{Path(file).resolve()}:{function}"
+    user_function(reference, "a method")  # one that is not there is reported before anything is written
+    return reference, None
 
 
 def _folder(data: str | Path | None) -> str:

@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from gfimu.base.errors import InputError
-from gfimu.calibration.registry import METHODS
 from gfimu.commands.shell import completion
 from gfimu.commands.shell.declare import Group, Option, command
 from gfimu.commands.shell.options import (
@@ -37,7 +36,7 @@ if TYPE_CHECKING:
     from gfimu.array.gravity import Latitude
     from gfimu.base.files.memory import MemorySize
     from gfimu.calibration.given import CalibrationPoses, CalibrationPrior, RateTable
-    from gfimu.calibration.registry import CalibrationMethod
+    from gfimu.calibration.method import CalibrationMethod
     from gfimu.calibration.result import Calibration
     from gfimu.commands.opened import Source
     from gfimu.recording import Recording
@@ -60,7 +59,12 @@ _OPTION_NAMES = {
 }
 """What the options are that some methods do not use, by the field of the task."""
 
-_METHOD = Option(f"Method: {', '.join(METHODS)}.", "METHOD", offers=completion.words(*METHODS), argument=True)
+_METHODS = (
+    "six-position", "recursive", "multi-position", "twelve-position", "array", "spin", "gyro", "gyro-rate-table",
+)  # fmt: skip
+"""Those of `gfimu.calibration.registry`, in its order; that has the functions, and help does not wait for scipy."""
+
+_METHOD = Option(f"Method: {', '.join(_METHODS)}.", "METHOD", offers=completion.words(*_METHODS), argument=True)
 _RECORDING = Option(
     "Recording of static poses: .csv, .parquet, a MIMU4444 stream, or text rows time x y z.",
     "RUN", kind=Path, argument=True, reads=True,
@@ -228,7 +232,7 @@ def calibrate(
     from gfimu.base.units import STANDARD_GRAVITY
     from gfimu.calibration.check_poses import check_on_poses
     from gfimu.calibration.given import CalibrationPoses, CalibrationPrior, RateTable
-    from gfimu.calibration.methods import CalibrationTask, run_calibration
+    from gfimu.calibration.method import CalibrationTask, run_calibration
     from gfimu.calibration.registry import calibration_method
     from gfimu.commands.opened import as_array, as_run, as_source, name_of
     from gfimu.recording.checks import examine
@@ -322,6 +326,8 @@ def _refuse_the_same(run: "Recording", others: "Recording", name: str) -> None:
 
 def _refuse_unused(method: "CalibrationMethod", **given: object) -> None:
     """Refuse an option that the method would ignore."""
+    from gfimu.calibration.registry import METHODS
+
     for name, value in given.items():
         if value is not None and name not in method.options:
             users = " or ".join(other.name for other in METHODS.values() if name in other.options)

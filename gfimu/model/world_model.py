@@ -31,7 +31,6 @@ __all__ = [
     "WorldModel",
     "acts_back",
     "axis_inclination",
-    "bound_of",
     "dependence_of",
     "is_linear",
     "is_of_one_recording",
@@ -66,10 +65,7 @@ class Spin(Protocol):
 
 
 class Size(Protocol):
-    """One linear coordinate of an effect: key, unit, physical prior, sign, finite-difference step.
-
-    It may have ``most``, the largest size that a fit may take, and ``bound`` (see `bound_of`); others need not.
-    """
+    """One linear coordinate of an effect, as `gfimu.model.own_rig.places.Size` describes it."""
 
     @property
     def key(self) -> str: ...  # noqa: D102
@@ -81,11 +77,10 @@ class Size(Protocol):
     def positive(self) -> bool: ...  # noqa: D102
     @property
     def step(self) -> float: ...  # noqa: D102
-
-
-def bound_of(size: Size) -> float:
-    """Return the size beyond which the twin must be of another unit, in the size's unit; infinite where it has none."""
-    return float(getattr(size, "bound", np.inf))
+    @property
+    def most(self) -> float: ...  # noqa: D102
+    @property
+    def bound(self) -> float: ...  # noqa: D102
 
 
 class Pattern(Protocol):
@@ -146,8 +141,8 @@ def is_of_wiring(effect: Effect) -> bool:
 
 def prior_of(family: EffectFamily, families: Iterable[EffectFamily]) -> float:
     """Return the prior probability of one kind of effect among several, of which some are rarer (``rarity``)."""
-    total = sum(1.0 / float(getattr(one, "rarity", 1.0)) for one in families)
-    return 1.0 / (float(getattr(family, "rarity", 1.0)) * total)
+    chance, *chances = (1.0 / float(getattr(one, "rarity", 1.0)) for one in (family, *families))
+    return chance / sum(chances)
 
 
 def memory_of(effect: Effect) -> float:

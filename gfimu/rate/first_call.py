@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import FunctionType
 from typing import Any
 
 from gfimu.rate.recursion import forward
@@ -14,7 +15,7 @@ def must_compile(kernel: Any = forward) -> bool:
 
     numba keeps compiled code beside the source, or in ``NUMBA_CACHE_DIR``, once per installation and kind of processor.
     """
-    if getattr(kernel, "signatures", True):  # a plain function where numba is switched off
+    if isinstance(kernel, FunctionType) or kernel.signatures:  # a plain function where numba is switched off
         return False
     try:  # numba has no public way to ask what it keeps
         return not kernel._cache._cache_file._load_index()

@@ -1,49 +1,26 @@
-"""The methods for the angular rate by name: the one list from which every call and message takes the names.
-
-The records name their functions instead of importing them, so that a command can list the methods without loading
-the compiled filter.
-"""
+"""The methods for the angular rate by name: the one list from which every call and message takes the names."""
 
 from __future__ import annotations
 
-import pkgutil
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Protocol, cast
+from typing import TYPE_CHECKING
 
 from gfimu.base.errors import InputError, unknown_name
 from gfimu.base.plugins import plugins
+from gfimu.rate.solvers import (
+    algebraic_from_rest,
+    filter_readings,
+    integrate_from_rest,
+    maximum_likelihood_from_rest,
+    smooth_readings,
+)
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from numpy.typing import ArrayLike
-
-    from gfimu.array.array import AccelerometerArray
-    from gfimu.rate.kalman import FilterSettings
     from gfimu.rate.result import RateEstimate
-    from gfimu.rate.sensing import SensorErrors
 
-__all__ = ["RATE_METHODS", "RateMethod", "RateSolver", "rate_method", "recursive_methods"]
-
-
-class RateSolver(Protocol):
-    """A method for the angular rate; ``gyro`` and ``progress`` go to recursive ones only."""
-
-    def __call__(
-        self,
-        array: AccelerometerArray,
-        t: ArrayLike,
-        readings: ArrayLike,
-        errors: SensorErrors,
-        settings: FilterSettings,
-        *,
-        gyro: ArrayLike | None = None,
-        progress: Callable[[float], object] | None = None,
-    ) -> RateEstimate:
-        """Estimate the angular rate at every sample."""
-        ...
+__all__ = ["RATE_METHODS", "RateMethod", "rate_method", "recursive_methods"]
 
 
 @dataclass(frozen=True)
@@ -54,8 +31,10 @@ class RateMethod:
     ----------
     name : str
         Name for ``--method``, and in the result.
-    function : str
-        Its `RateSolver`, as ``module:function``.
+    solver : callable
+        Estimates the rate at every sample: called with the array, times (n,) in s, readings (n, c) in m/s²,
+        `gfimu.SensorErrors` and `gfimu.rate.kalman.FilterSettings`, a recursive one also with ``gyro`` and
+        ``progress`` by name (`gfimu.estimate_rate`), it returns a `gfimu.RateEstimate`.
     uses : str
         Part of the readings it uses.
     recursive : bool
@@ -68,16 +47,11 @@ class RateMethod:
     """
 
     name: str
-    function: str
+    solver: Callable[..., RateEstimate]
     uses: str
     recursive: bool = False
     open_loop: bool = False
     uses_later_samples: bool = False
-
-    @property
-    def solver(self) -> RateSolver:
-        """The function that estimates."""
-        return cast(RateSolver, pkgutil.resolve_name(self.function))
 
     def refuse_gyro(self) -> None:
         """Raise `InputError` unless the method can fuse a gyro."""
@@ -101,13 +75,11 @@ class RateMethod:
 
 
 _RECORDS = (
-    RateMethod("integrate", "gfimu.rate.methods:integrate_from_rest", "α", open_loop=True),
-    RateMethod("algebraic", "gfimu.rate.methods:algebraic_from_rest", "null space, sample by sample"),
-    RateMethod("ml", "gfimu.rate.methods:maximum_likelihood_from_rest", "null space, sample by sample"),
-    RateMethod("filter", "gfimu.rate.filter:filter_rate", "α, null space, rest, gyro; samples so far", recursive=True),
-    RateMethod(
-        "smoother", "gfimu.rate.smoother:smooth_rate", "the same, all samples", recursive=True, uses_later_samples=True
-    ),
+    RateMethod("integrate", integrate_from_rest, "α", open_loop=True),
+    RateMethod("algebraic", algebraic_from_rest, "null space, sample by sample"),
+    RateMethod("ml", maximum_likelihood_from_rest, "null space, sample by sample"),
+    RateMethod("filter", filter_readings, "α, null space, rest, gyro; samples so far", recursive=True),
+    RateMethod("smoother", smooth_readings, "the same, all samples", recursive=True, uses_later_samples=True),
 )
 
 RATE_METHODS: Mapping[str, RateMethod] = MappingProxyType({method.name: method for method in _RECORDS})

@@ -35,7 +35,7 @@ def check_input(path: str | Path, *, largest: float = math.inf) -> Path:
     except FileNotFoundError:
         raise InputError(f"{_short(file)}: no such file; check the path") from None
     except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
+        reason = (error.strerror if isinstance(error, OSError) else None) or error
         raise InputError(f"{_short(file)}: {reason}; check the path") from None
     if stat.S_ISDIR(mode):
         raise InputError(f"{_short(file)}: is a directory; give a file")

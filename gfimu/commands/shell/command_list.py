@@ -33,6 +33,7 @@ def help_line(name: str) -> str:
 
 def declared_commands(name: str) -> list[Any]:
     """Return what the file of a command declares: the command, or those of a group of commands."""
+    # By its name, which is that of its file: a plain import of each would load them all for every call.
     module = importlib.import_module(f"gfimu.commands.{name}")
     found = [value.__command__ for value in vars(module).values() if hasattr(value, "__command__")]
     return [command for command in found if command.name.split()[0] == name]

@@ -110,7 +110,7 @@ class Cause:
         used = np.abs(self.mixing) > 0
         repeat = len(self.mixing) // len(sizes)
         signed = np.tile([size.positive for size in sizes], repeat)
-        most = np.tile([getattr(size, "most", np.inf) / size.prior_std for size in sizes], repeat)
+        most = np.tile([size.most / size.prior_std for size in sizes], repeat)
         with np.errstate(divide="ignore"):
             high = np.min(most[:, None] / np.abs(self.mixing), axis=0)
         return np.where((used & signed[:, None]).any(axis=0), SMALLEST_POSITIVE, -high), high
@@ -120,11 +120,10 @@ class Cause:
         ends = [
             size.key
             for size, value in zip(self.family.sizes(array), self.sizes(array, 0), strict=True)
-            if abs(value) >= _AT_END * getattr(size, "most", np.inf)
+            if abs(value) >= _AT_END * size.most
         ]
-        limits = getattr(self.family, "shape_limits", {})
         for key in self.free_shape:
-            low, high = limits.get(key, (0.0, np.inf))
+            low, high = self._shape_range(key)
             if not low < _AT_END * self.shape[key] or not self.shape[key] < _AT_END * high:
                 ends.append(key)
         return ends
@@ -154,8 +153,11 @@ class Cause:
         """Return a shape parameter after a step in its natural coordinate: log, or linear for angles."""
         if key.endswith("_rad"):
             return float(self.shape[key]) + step
-        low, high = getattr(self.family, "shape_limits", {}).get(key, (0.0, np.inf))
-        return float(np.clip(self.shape[key] * np.exp(step), low, high))
+        return float(np.clip(self.shape[key] * np.exp(step), *self._shape_range(key)))
+
+    def _shape_range(self, key: str) -> tuple[float, float]:
+        limits: Mapping[str, tuple[float, float]] = getattr(self.family, "shape_limits", {})
+        return limits.get(key, (0.0, np.inf))
 
 
 def effects_of(causes: Sequence[Cause], array: AccelerometerArray, run: int) -> list[Effect]:

@@ -14,7 +14,7 @@ from gfimu.array.array import AccelerometerArray
 from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.verdict.parts import NamedCause, Residual, Unexplained
-from gfimu.model.world_model import EffectFamily, bound_of
+from gfimu.model.world_model import EffectFamily
 
 __all__ = ["NOT_THIS_UNIT", "Judgement", "impossible_sizes", "judge", "measurable"]
 
@@ -113,7 +113,7 @@ def impossible_sizes(
     """Return a signature where a cause is larger than its part or rig can be off; empty where none is.
 
     Such a size says that the twin describes another unit: its array file, its axes or its units are wrong. The bound
-    is that of the effect's class (`gfimu.model.world_model.bound_of`); faults of the wiring have none.
+    is that of the effect's class (`gfimu.model.own_rig.places.Size.bound`); faults of the wiring have none.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ def impossible_sizes(
         sizes = family.sizes(array)
         values = family(cause.parameters).size_values(array) if sizes else np.zeros(0)
         for size, value in zip(sizes, values, strict=True):
-            bound = bound_of(size)
+            bound = size.bound
             if abs(value) > bound:
                 beyond.append((abs(value) / bound, f"{cause.effect} {size.key} = {value:.3g}, beyond ±{bound:.3g}"))
     if not beyond:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import os
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -20,27 +19,10 @@ from sim.trials.sweep.dataset import Dataset
 from sim.trials.sweep.design import Case
 from sim.trials.sweep.plan import PlanFile
 
-__all__ = ["Method", "answer_task", "answers_of", "benchmark_plan", "benchmark_work", "load_method"]
+__all__ = ["Method", "answer_task", "answers_of", "benchmark_plan", "benchmark_work"]
 
 Method = Callable[[Task], Mapping[str, Any]]
 """A method: it takes a task and returns the JSON form of an `Answer`; ``world`` and ``method`` are filled in."""
-
-
-def load_method(reference: str) -> Method:
-    """Return a method by ``FILE.py:function`` or ``module:function``.
-
-    Raises
-    ------
-    InputError
-        If the file, module or function is not there, or the file raises an exception.
-    """
-    place, _, function = reference.rpartition(":")
-    if place.endswith(".py"):
-        return user_function(reference, "a method")
-    try:
-        return getattr(importlib.import_module(place), function)  # type: ignore[no-any-return]
-    except (ImportError, AttributeError, ValueError) as error:  # ValueError: no module is named
-        raise InputError(f"{reference}: {error}; give a method as FILE.py:FUNCTION") from None
 
 
 def benchmark_plan(
@@ -51,7 +33,7 @@ def benchmark_plan(
     Parameters
     ----------
     reference : str
-        Method, as `load_method` takes it.
+        Method: ``FILE.py:function``, or module and name of one that comes with the benchmark.
     sets : sequence of str
         Names of sets.
     split : str
@@ -76,12 +58,12 @@ def benchmark_plan(
     return PlanFile(factors | ({"data": [data]} if data else {}), kind="benchmark", batch=1)
 
 
-def benchmark_work(case: Case) -> dict[str, Any]:
-    """Run the method of a plan on a world; the whole answer is one column of JSON."""
+def benchmark_work(case: Case, own: Method | None = None) -> dict[str, Any]:
+    """Run a method that comes with the benchmark, or that of the plan's file, on a world; the answer is JSON."""
     world, reference = str(case.values["world"]), str(case.values["method"])
     measured = find_case(world).generator == MEASURED
     task = real_task(world, str(case.values["data"])) if measured else task_of(world)
-    answer = answer_task(load_method(reference), task)
+    answer = answer_task(own or user_function(reference, "a method"), task)
     return {
         "verdict": answer.verdict,
         "processor_s": answer.processor_s,

@@ -25,7 +25,7 @@ import gfimu
 from gfimu.recording.importing.raw_table import RawFile, RawTable
 from gfimu.recording.importing.readers import Reader
 from gfimu.model.own_rig import Cause, Parameter, SimulatorModel
-from gfimu.rate.registry import RateMethod
+from gfimu.rate.registry import RATE_METHODS, RateMethod
 from gfimu.recording.formats import RecordingFormat
 from sim.effects.base import Effect, Size
 
@@ -55,7 +55,7 @@ def read_words(path, text):
 
 
 words = Reader(read_words, (b"WORDS",))
-mine = RateMethod("mine", "gfimu.rate.methods:algebraic_from_rest", "what it likes")
+mine = RateMethod("mine", RATE_METHODS["algebraic"].solver, "what it likes")
 
 
 def recognise(path):

@@ -3,13 +3,18 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from calibration_cases import calibrate
 
-from gfimu import AccelerometerArray, specific_force
-from gfimu.base import STANDARD_GRAVITY
-from gfimu.calibration import METHODS, SpinPolicy, calibrate
-from gfimu.recording import Recording, array_metadata
-from sim import PoseSequence, Sensor, SensorSettings, speed_sweep, spin_profile
+from gfimu.array.array import AccelerometerArray
+from gfimu.array.kinematics import specific_force
+from gfimu.base.units import STANDARD_GRAVITY
+from gfimu.calibration.spin import SpinPolicy, spin
+from gfimu.recording import Recording
+from gfimu.recording.carried_array import array_metadata
+from sim.chips.adxl345 import Sensor, SensorSettings
 from sim.forward import leaning, rigid_readings, table_geometry
+from sim.motions.pose_sequence import PoseSequence
+from sim.motions.profiles import speed_sweep, spin_profile
 from sim.world import Lean, World
 
 RATE = 100.0
@@ -114,7 +119,7 @@ def normalised_errors(seed, sides=(UPRIGHT, ON_ITS_SIDE), settings=None):
     result = unit.static(rng)
     for side in sides:
         unit = unit.switched_on_again(rng)
-        result = METHODS["spin"].fit(unit.turn(rng, side), CUBE, start=result)
+        result = spin(unit.turn(rng, side), CUBE, start=result)
     found = {}
     for kind, truth in unit.truth.items():
         names = [f"{chip}_{kind}_{axis}" for chip in result.chips for axis in "xyz"]

@@ -5,15 +5,14 @@ from dataclasses import FrozenInstanceError, fields
 
 import numpy as np
 import pytest
-from calibration_cases import GRAVITY, MULTI
+from calibration_cases import GRAVITY, MULTI, calibrate
 from every_item import every
 from recordings import pose_recording
 
-from gfimu import InputError
-from gfimu.calibration import METHODS, calibrate
+from gfimu.base.errors import InputError
 from gfimu.calibration.error_model import GAUGES
-from gfimu.calibration.methods import CalibrationTask, run_calibration
-from gfimu.calibration.registry import CalibrationMethod, calibration_method
+from gfimu.calibration.method import CalibrationTask, run_calibration
+from gfimu.calibration.registry import METHODS, CalibrationMethod, calibration_method
 
 
 @every("method", METHODS.values())
@@ -61,8 +60,8 @@ def counted(observations, *, gravity, gauge):
 def test_a_new_method_is_one_record(triad):
     record = CalibrationMethod(
         "counted",
-        f"{__name__}:counted",
-        METHODS["six-position"].runner,
+        counted,
+        METHODS["six-position"].run,
         needs="six faces, level",
         estimates="M and b of each chip",
         source="none",

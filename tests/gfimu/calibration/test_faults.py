@@ -4,14 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from calibration_cases import FACES, GRAVITY, MULTI
+from calibration_cases import FACES, GRAVITY, MULTI, calibrate
 from recordings import pose_recording
 
-from gfimu import InputError
-from gfimu.calibration import METHODS, averaged_poses, calibrate, every_sample
-from gfimu.calibration.methods import calibrate_gyro
-from gfimu.calibration.observations import denoised_samples, observations_from
-from gfimu.recording import Recording, detect_rest
+from gfimu.base.errors import InputError
+from gfimu.calibration.observations import averaged_poses, denoised_samples, every_sample, observations_from
+from gfimu.calibration.registry import METHODS
+from gfimu.recording import Recording
+from gfimu.recording.rest import detect_rest
 
 TRIAD_METHODS = [name for name, method in METHODS.items() if method.gauges]
 
@@ -113,7 +113,7 @@ def test_saturated_channel(triad):
 
 
 def test_coarse_counts_are_not_saturation(triad):
-    from gfimu.calibration import ErrorModel
+    from gfimu.calibration.error_model import ErrorModel
 
     counts = ErrorModel(triad.sensitivity * 25.0, triad.bias * 25.0)
     recording = pose_recording([counts], MULTI, np.random.default_rng(8), sigma=0.4, unit="lsb")
@@ -162,4 +162,4 @@ def test_no_rest_no_triads_no_method(triad):
     with pytest.raises(InputError, match="unknown input 'cooked'"):
         calibrate("multi-position", recording, input_kind="cooked")
     with pytest.raises(InputError, match="lacks gyro_x_rad_s"):
-        calibrate_gyro(recording)
+        calibrate("gyro", recording)

@@ -4,10 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from calibration_cases import calibrate
 
-from gfimu import InputError
-from gfimu.calibration import METHODS, averaged_poses, calibrate, every_sample, read_text_triad
-from gfimu.recording import detect_rest
+from gfimu.base.errors import InputError
+from gfimu.calibration.imu_tk import read_text_triad
+from gfimu.calibration.multi_position import multi_position
+from gfimu.calibration.observations import averaged_poses, every_sample
+from gfimu.recording.rest import detect_rest
 
 GRAVITY = 9.81744
 FACTORY_SCALE = [415.0, 413.0, 415.0]
@@ -48,7 +51,7 @@ def test_imu_tk_solutions(recording, kind):
             observations = every_sample(recording, replace(rest, stop=rest.start + 100))
         else:
             observations = averaged_poses(recording, rest)
-        result = METHODS["multi-position"].fit(observations, gravity=GRAVITY, gauge="z_axis", weighting="uniform")
+        result = multi_position(observations, gravity=GRAVITY, gauge="z_axis", weighting="uniform")
         miss = np.linalg.norm(result.models["a1"].correct(observations.readings), axis=1) - GRAVITY
         if best is None or miss @ miss < best[0]:
             best = miss @ miss, result

@@ -74,7 +74,7 @@ def turning_at_one(array, t, readings, errors, settings):
 
 
 def test_a_new_method_is_one_record(run, monkeypatch):
-    mine = RateMethod("mine", f"{__name__}:turning_at_one", "nothing")
+    mine = RateMethod("mine", turning_at_one, "nothing")
     monkeypatch.setattr(registry, "RATE_METHODS", {**RATE_METHODS, "mine": mine})
     for solve in (estimate, estimate_from_rest):
         found = solve(run, CUBE, method="mine")

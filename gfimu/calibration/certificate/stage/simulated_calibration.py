@@ -116,8 +116,7 @@ def _fit(calibration: Calibration, chip: str, force: Floats, error: Floats) -> C
     levelling = chip_statistic(calibration, chip, "levelling_std_rad")
     if "levelling_std_rad" in method.options and levelling is not None:
         options["levelling_std_rad"] = levelling
-    fit: Calibration = method.fit(observations, gravity=calibration.gravity, gauge=calibration.gauge, **options)
-    return fit
+    return method.fit(observations, gravity=calibration.gravity, gauge=calibration.gauge, **options)
 
 
 def _misfit(calibration: Calibration, fits: list[Calibration]) -> float:

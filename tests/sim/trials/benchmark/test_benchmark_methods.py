@@ -6,18 +6,19 @@ import numpy as np
 import pytest
 
 import gfimu
-from gfimu import InputError
+from gfimu.base.errors import InputError
+from gfimu.base.plugins import user_function
 from sim.effects import EFFECTS
-from sim.trials.benchmark import baselines
+from sim.trials.benchmark import baselines as package
 from sim.trials.benchmark.answer import answer_of, read_answers
-from sim.trials.benchmark.baselines import BASELINES
+from sim.trials.benchmark.baselines import BASELINES, baselines
 from sim.trials.benchmark.baselines.best_single import _log_tail
 from sim.trials.benchmark.judge import judge
 from sim.trials.benchmark.library import LinearLibrary, stated_parameters
-from sim.trials.benchmark.methods import answer_task, load_method
+from sim.trials.benchmark.methods import answer_task
 from sim.trials.benchmark.truth_file import fixed_world, task_of, truths
 
-FOLDER = Path(baselines.__file__).parent
+FOLDER = Path(package.__file__).parent
 
 
 def the_world(name, set_name="own"):
@@ -28,14 +29,15 @@ def the_world(name, set_name="own"):
 
 @pytest.mark.parametrize("name", sorted({file.stem for file in FOLDER.glob("*.py")} - {"__init__", "sysid"}))
 def test_a_baseline_is_shorter_than_fifty_lines(name):
-    assert f"sim.trials.benchmark.baselines.{name}:answer" in BASELINES.values()
+    assert name in BASELINES
+    assert baselines()[name].__module__ == f"sim.trials.benchmark.baselines.{name}"
     assert len((FOLDER / f"{name}.py").read_text(encoding="utf-8").splitlines()) < 50
 
 
 @pytest.mark.parametrize("name", ["best_single", "greedy_bic", "oracle"])
 def test_baselines_name_a_large_effect_with_its_size(name):
     world = the_world("mount_tilt")
-    (found,) = judge([answer_task(load_method(BASELINES[name]), task_of(world))])
+    (found,) = judge([answer_task(baselines()[name], task_of(world))])
     assert "mount_tilt" in found.said  # the greedy one adds what slow noise looks like
     assert found.outcome == ("wrong" if name == "greedy_bic" else "alone")
     assert found.removed > 0.99
@@ -79,7 +81,7 @@ def test_sizes_become_the_parameters_of_an_answer():
 @pytest.mark.parametrize("name", ["best_single", "oracle"])
 def test_baselines_predict_a_tone(name):
     world = the_world("interference_tone")
-    (found,) = judge([answer_task(load_method(BASELINES[name]), task_of(world))])
+    (found,) = judge([answer_task(baselines()[name], task_of(world))])
     assert found.outcome == "alone"
     assert found.z  # amplitude, phase
 
@@ -161,10 +163,10 @@ def test_a_wrong_method_is_refused_before_anything_is_written(tmp_path, referenc
 def test_a_file_that_fails_names_its_error(tmp_path):
     (tmp_path / "mine.py").write_text("import nothing_of_that_name\n")
     with pytest.raises(InputError, match="ModuleNotFoundError"):
-        load_method(f"{tmp_path / 'mine.py'}:answer")
+        user_function(f"{tmp_path / 'mine.py'}:answer", "a method")
     (tmp_path / "mine.py").write_text("def other(task): pass\n")
     with pytest.raises(InputError, match=r"unknown function of .*mine\.py 'answer'"):
-        load_method(f"{tmp_path / 'mine.py'}:answer")
+        user_function(f"{tmp_path / 'mine.py'}:answer", "a method")
 
 
 def test_the_measured_set_needs_its_data(tmp_path):

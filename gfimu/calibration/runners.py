@@ -1,17 +1,13 @@
-"""One call for every method: from a recording to a calibration, with the checks in between."""
+"""From a recording to the input of a fit, with the checks in between: what the calibration methods have in common."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 
-from gfimu.array.array import AccelerometerArray
 from gfimu.array.parts.part import Part
 from gfimu.base.errors import InputError, naming
-from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.calibration.array_calibration import update_array_calibration
 from gfimu.calibration.combine import combine
 from gfimu.calibration.faults import (
@@ -23,162 +19,22 @@ from gfimu.calibration.faults import (
 )
 from gfimu.calibration.fit_quality import mean_factor
 from gfimu.calibration.given import RateTable
+from gfimu.calibration.method import CalibrationMethod, CalibrationTask
 from gfimu.calibration.nonlinearity import quadratic_std
 from gfimu.calibration.observations import Observations, observations_from
 from gfimu.calibration.rate_table import body_axis, find_plateaus
-from gfimu.calibration.registry import METHODS, CalibrationMethod, calibration_method
 from gfimu.calibration.result import Calibration
 from gfimu.calibration.spin.policy import SpinPolicy
 from gfimu.recording import Recording
 from gfimu.recording.rest import detect_rest
 
 __all__ = [
-    "METHODS",
-    "CalibrationTask",
-    "calibrate",
     "calibrate_by_spin",
-    "calibrate_gyro",
     "calibrate_on_rate_table",
     "calibrate_reference_gyro",
     "calibrate_triads",
     "calibrate_whole_array",
-    "run_calibration",
-    "temperature_statistics",
 ]
-
-
-@dataclass(frozen=True)
-class CalibrationTask:
-    """What a calibration method works on; each method uses the fields its record lists.
-
-    Parameters
-    ----------
-    recording : Recording
-        Readings in m/s² or raw counts.
-    gravity : float
-        Local gravity, m/s².
-    n_parameters : {9, 12}, optional
-        Parameters per triad; the method's default if not given.
-    input_kind : {"averaged", "raw", "wavelet"}
-        Rows that the fit uses.
-    rest_threshold : float, optional
-        Threshold of rest, reading unit squared; chosen by the data if not given.
-    min_rest_s : float, optional
-        Shortest pose, s; the method's default if not given.
-    levelling_std_rad : float, optional
-        Standard deviation of the tilt of a pose, rad.
-    array : AccelerometerArray, optional
-        The drawing.
-    motion : Recording, optional
-        Recording with the motion, if it is another one.
-    update : Calibration, optional
-        Calibration of an earlier run to carry over.
-    start : Calibration, optional
-        Calibration that a spin starts from.
-    radius_std_m, stretch_std_s2_rad2 : float, optional
-        Of a spin: standard deviations of a chip's radius and of the arm stretch; those of its policy if not given.
-    turn_on_std_m_s2, bias_walk_m_s2_rt_s : float
-        With ``update`` or ``start``: change of a bias between power-ons, m/s²; with ``update`` random walk between
-        poses, m/s²/√s.
-    latitude_deg : float, optional
-        Latitude, degrees, for the Earth's rate.
-    rate_table : RateTable, optional
-        What a gyro on a rate table needs besides.
-    wavelet : mapping
-        Options of `gfimu.calibration.observations.denoised_samples`, for the wavelet input.
-    progress : callable, optional
-        Called with the share done of a fit that takes long, 0 to 1.
-    """
-
-    recording: Recording
-    gravity: float = STANDARD_GRAVITY
-    n_parameters: int | None = None
-    input_kind: str = "averaged"
-    rest_threshold: float | None = None
-    min_rest_s: float | None = None
-    levelling_std_rad: float | None = None
-    array: AccelerometerArray | None = None
-    motion: Recording | None = None
-    update: Calibration | None = None
-    start: Calibration | None = None
-    radius_std_m: float | None = None
-    stretch_std_s2_rad2: float | None = None
-    turn_on_std_m_s2: float = 0.03
-    bias_walk_m_s2_rt_s: float = 0.0
-    latitude_deg: float | None = None
-    rate_table: RateTable | None = None
-    wavelet: Mapping[str, Any] = field(default_factory=dict)
-    progress: Callable[[float], object] | None = None
-
-
-def calibrate(
-    method: str,
-    recording: Recording,
-    *,
-    gravity: float = STANDARD_GRAVITY,
-    n_parameters: int | None = None,
-    input_kind: str = "averaged",
-    rest_threshold: float | None = None,
-    min_rest_s: float | None = None,
-    levelling_std_rad: float | None = None,
-    array: AccelerometerArray | None = None,
-) -> Calibration:
-    """Calibrate a recording of static poses by a method of `gfimu.calibration.registry.METHODS`.
-
-    Parameters
-    ----------
-    method : str
-        A key of `gfimu.calibration.registry.METHODS`.
-    recording : Recording
-        Readings of one or more chips, in m/s² or raw counts.
-    gravity : float
-        Local gravity, m/s²; see `gfimu.array.gravity.local_gravity`.
-    n_parameters : {9, 12}, optional
-        Parameters per triad; 12 by default, 9 for ``multi-position``.
-    input_kind : {"averaged", "raw", "wavelet"}
-        Rows that the fit uses.
-    rest_threshold : float, optional
-        Threshold of rest, reading unit squared; chosen by the data if not given.
-    min_rest_s : float, optional
-        Shortest pose, s; the method's default if not given.
-    levelling_std_rad : float, optional
-        Standard deviation of the tilt of a pose, rad, for the methods that rely on levelled faces.
-    array : AccelerometerArray, optional
-        The drawing, for the methods that calibrate an array as a whole.
-
-    Returns
-    -------
-    Calibration
-        One result for all chips; warnings name what looked wrong.
-
-    Raises
-    ------
-    InputError
-        If the method is unknown, the data are faulty, or the poses don't suffice.
-    """
-    record = calibration_method(method)
-    task = CalibrationTask(
-        recording, gravity, n_parameters, input_kind, rest_threshold, min_rest_s, levelling_std_rad, array
-    )
-    return run_calibration(record, task)
-
-
-def run_calibration(method: CalibrationMethod, task: CalibrationTask) -> Calibration:
-    """Calibrate by the record of a method; raises as `calibrate`."""
-    result: Calibration = method.run(method, task)
-    return replace(result, statistics={**result.statistics, **temperature_statistics(task.recording)})
-
-
-def temperature_statistics(recording: Recording) -> dict[str, float]:
-    """Return mean and span of the temperature at which a recording was made; empty if it has none.
-
-    Sensitivity and bias hold at that temperature: a condition of the calibration.
-    """
-    temperature = recording.reference.get("temperature_degC")
-    seen = np.empty(0) if temperature is None else temperature[np.isfinite(temperature)]
-    if not len(seen):
-        return {}
-    return {"temperature_mean_degC": float(seen.mean()), "temperature_span_K": float(np.ptp(seen))}
 
 
 def calibrate_triads(method: CalibrationMethod, task: CalibrationTask) -> Calibration:
@@ -258,7 +114,7 @@ def calibrate_whole_array(method: CalibrationMethod, task: CalibrationTask) -> C
             rest_threshold=task.rest_threshold,
             min_rest_s=_min_rest(method, task),
         )
-    result: Calibration = method.fit(
+    return method.fit(
         task.recording,
         task.array,
         gravity=task.gravity,
@@ -267,7 +123,6 @@ def calibrate_whole_array(method: CalibrationMethod, task: CalibrationTask) -> C
         min_rest_s=_min_rest(method, task),
         progress=task.progress,
     )
-    return result
 
 
 def calibrate_by_spin(method: CalibrationMethod, task: CalibrationTask) -> Calibration:
@@ -285,7 +140,7 @@ def calibrate_by_spin(method: CalibrationMethod, task: CalibrationTask) -> Calib
     for name, value in changes.items():
         if not 0.0 < value < np.inf:
             raise InputError(f"{name} = {value:g}: a standard deviation is positive")
-    result: Calibration = method.fit(
+    result = method.fit(
         task.recording,
         task.array,
         start=task.start,
@@ -317,8 +172,7 @@ def calibrate_reference_gyro(method: CalibrationMethod, task: CalibrationTask) -
         channels=("gyro1", "gyro2", "gyro3"),
         unit="rad_s",
     )
-    result: Calibration = method.fit(observations_from(rates, rest, "averaged"))
-    return result
+    return method.fit(observations_from(rates, rest, "averaged"))
 
 
 def calibrate_on_rate_table(method: CalibrationMethod, task: CalibrationTask) -> Calibration:
@@ -340,17 +194,7 @@ def calibrate_on_rate_table(method: CalibrationMethod, task: CalibrationTask) ->
             mountings.append(
                 find_plateaus(run, axis=axis, threshold=task.rest_threshold, min_duration_s=_min_rest(method, task))
             )
-    result: Calibration = method.fit(
-        mountings, latitude_deg=task.latitude_deg, levelling_std_rad=task.levelling_std_rad or 0.0
-    )
-    return result
-
-
-def calibrate_gyro(
-    recording: Recording, *, rest_threshold: float | None = None, min_rest_s: float | None = None
-) -> Calibration:
-    """Calibrate the reference gyro of a recording at rest against the Earth's rate; raises as `calibrate`."""
-    return calibrate("gyro", recording, rest_threshold=rest_threshold, min_rest_s=min_rest_s)
+    return method.fit(mountings, latitude_deg=task.latitude_deg, levelling_std_rad=task.levelling_std_rad or 0.0)
 
 
 def _gauge(method: CalibrationMethod, n_parameters: int | None) -> str:
