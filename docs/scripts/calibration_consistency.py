@@ -22,8 +22,8 @@ from gfimu.array.array import AccelerometerArray
 from gfimu.array.kinematics import specific_force
 from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.calibration.error_model import ErrorModel
-from gfimu.calibration.methods import calibrate
-from gfimu.calibration.registry import METHODS
+from gfimu.calibration.methods import CalibrationTask, run_calibration
+from gfimu.calibration.registry import METHODS, calibration_method
 from gfimu.calibration.result import Calibration
 from gfimu.recording import Recording
 from gfimu.recording.carried_array import array_metadata
@@ -125,7 +125,8 @@ def normalised_errors(
             np.random.default_rng([seed, run]), settings or SensorSettings(), triangular=triangular
         )
         drawing = poses.array if method == "array" else None
-        result = calibrate(method, recording, n_parameters=parameters, array=drawing, **levelled)
+        task = CalibrationTask(recording, n_parameters=parameters, array=drawing, **levelled)
+        result = run_calibration(calibration_method(method), task)
         error, std = result.values - truth_of(result, poses.array, models), result.std
         if method == "multi-position" and result.null_space.size:  # the rotation stays at its start: compare the rest
             shown = np.eye(len(error)) - result.null_space @ result.null_space.T

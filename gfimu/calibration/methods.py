@@ -26,7 +26,7 @@ from gfimu.calibration.given import RateTable
 from gfimu.calibration.nonlinearity import quadratic_std
 from gfimu.calibration.observations import Observations, observations_from
 from gfimu.calibration.rate_table import body_axis, find_plateaus
-from gfimu.calibration.registry import METHODS, CalibrationMethod, calibration_method
+from gfimu.calibration.registry import METHODS, CalibrationMethod
 from gfimu.calibration.result import Calibration
 from gfimu.calibration.spin.policy import SpinPolicy
 from gfimu.recording import Recording
@@ -35,9 +35,7 @@ from gfimu.recording.rest import detect_rest
 __all__ = [
     "METHODS",
     "CalibrationTask",
-    "calibrate",
     "calibrate_by_spin",
-    "calibrate_gyro",
     "calibrate_on_rate_table",
     "calibrate_reference_gyro",
     "calibrate_triads",
@@ -111,60 +109,14 @@ class CalibrationTask:
     progress: Callable[[float], object] | None = None
 
 
-def calibrate(
-    method: str,
-    recording: Recording,
-    *,
-    gravity: float = STANDARD_GRAVITY,
-    n_parameters: int | None = None,
-    input_kind: str = "averaged",
-    rest_threshold: float | None = None,
-    min_rest_s: float | None = None,
-    levelling_std_rad: float | None = None,
-    array: AccelerometerArray | None = None,
-) -> Calibration:
-    """Calibrate a recording of static poses by a method of `gfimu.calibration.registry.METHODS`.
-
-    Parameters
-    ----------
-    method : str
-        A key of `gfimu.calibration.registry.METHODS`.
-    recording : Recording
-        Readings of one or more chips, in m/s² or raw counts.
-    gravity : float
-        Local gravity, m/s²; see `gfimu.array.gravity.local_gravity`.
-    n_parameters : {9, 12}, optional
-        Parameters per triad; 12 by default, 9 for ``multi-position``.
-    input_kind : {"averaged", "raw", "wavelet"}
-        Rows that the fit uses.
-    rest_threshold : float, optional
-        Threshold of rest, reading unit squared; chosen by the data if not given.
-    min_rest_s : float, optional
-        Shortest pose, s; the method's default if not given.
-    levelling_std_rad : float, optional
-        Standard deviation of the tilt of a pose, rad, for the methods that rely on levelled faces.
-    array : AccelerometerArray, optional
-        The drawing, for the methods that calibrate an array as a whole.
-
-    Returns
-    -------
-    Calibration
-        One result for all chips; warnings name what looked wrong.
+def run_calibration(method: CalibrationMethod, task: CalibrationTask) -> Calibration:
+    """Calibrate by the record of a method.
 
     Raises
     ------
     InputError
-        If the method is unknown, the data are faulty, or the poses don't suffice.
+        If the data are faulty, or the poses don't suffice.
     """
-    record = calibration_method(method)
-    task = CalibrationTask(
-        recording, gravity, n_parameters, input_kind, rest_threshold, min_rest_s, levelling_std_rad, array
-    )
-    return run_calibration(record, task)
-
-
-def run_calibration(method: CalibrationMethod, task: CalibrationTask) -> Calibration:
-    """Calibrate by the record of a method; raises as `calibrate`."""
     result: Calibration = method.run(method, task)
     return replace(result, statistics={**result.statistics, **temperature_statistics(task.recording)})
 
@@ -344,13 +296,6 @@ def calibrate_on_rate_table(method: CalibrationMethod, task: CalibrationTask) ->
         mountings, latitude_deg=task.latitude_deg, levelling_std_rad=task.levelling_std_rad or 0.0
     )
     return result
-
-
-def calibrate_gyro(
-    recording: Recording, *, rest_threshold: float | None = None, min_rest_s: float | None = None
-) -> Calibration:
-    """Calibrate the reference gyro of a recording at rest against the Earth's rate; raises as `calibrate`."""
-    return calibrate("gyro", recording, rest_threshold=rest_threshold, min_rest_s=min_rest_s)
 
 
 def _gauge(method: CalibrationMethod, n_parameters: int | None) -> str:

@@ -27,7 +27,7 @@ from gfimu.recording.importing.readers import read_foreign
 from gfimu.recording.importing.readers.tables import table_file
 from gfimu.recording.recording import Recording
 
-__all__ = ["MappedFile", "RecordingLike", "mapped_recording", "mapped_reference"]
+__all__ = ["MappedFile", "RecordingLike", "RecordingSource", "mapped_recording", "mapped_reference"]
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,10 @@ class MappedFile(os.PathLike[str]):
         return mapped_recording([self.path, *self.others], self.column_map, array=array)
 
 
-RecordingLike = Recording | str | Path | MappedFile | ArrowStream | tuple[ArrayLike, ArrayLike]
+RecordingSource = Recording | str | Path | MappedFile | ArrowStream
+"""A recording, which its readers return as it is, or what they read one from."""
+
+RecordingLike = RecordingSource | tuple[ArrayLike, ArrayLike]
 """What stands for a recording in the arguments of a command: itself, its file, a table of pandas, polars or pyarrow, or
 times (n,), s, with readings (n, c), m/s²."""
 

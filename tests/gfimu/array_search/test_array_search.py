@@ -6,8 +6,8 @@ import pytest
 from gfimu.array.array import AccelerometerArray
 from gfimu.array.dilution import gdop_lower_bound
 from gfimu.array_search.scoring import score
-from gfimu.array_search.search import optimize
 from gfimu.base.errors import GeometryError, InputError
+from gfimu.commands.optimize import optimize
 
 
 def search(n_chips, seed=1, restarts=12, **options):

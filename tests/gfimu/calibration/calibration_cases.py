@@ -5,7 +5,9 @@ import itertools
 import numpy as np
 
 from gfimu.calibration.error_model import ErrorModel
+from gfimu.calibration.methods import CalibrationTask, run_calibration
 from gfimu.calibration.observations import Observations
+from gfimu.calibration.registry import calibration_method
 
 GRAVITY = 9.81
 FACES = np.concatenate([np.eye(3), -np.eye(3)])
@@ -13,6 +15,11 @@ EDGES = np.array([v for v in itertools.product((-1, 0, 1), repeat=3) if np.abs(v
 CORNERS = np.array(list(itertools.product((-1, 1), repeat=3))) / np.sqrt(3)
 MULTI = np.concatenate([FACES, EDGES])
 TWELVE = np.concatenate([FACES, EDGES[[0, 1, 4, 6, 8, 11]]])
+
+
+def calibrate(method, recording, **settings):
+    """Calibrate by the name of a method, with fields of its task."""
+    return run_calibration(calibration_method(method), CalibrationTask(recording, **settings))
 
 
 def simulate(model, directions, rng, *, sigma=0.002, tilt=0.0, gravity=GRAVITY, unit="m_s2"):

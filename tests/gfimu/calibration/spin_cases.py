@@ -3,11 +3,11 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from calibration_cases import calibrate
 
 from gfimu.array.array import AccelerometerArray
 from gfimu.array.kinematics import specific_force
 from gfimu.base.units import STANDARD_GRAVITY
-from gfimu.calibration.methods import calibrate
 from gfimu.calibration.spin import SpinPolicy, spin
 from gfimu.recording import Recording
 from gfimu.recording.carried_array import array_metadata

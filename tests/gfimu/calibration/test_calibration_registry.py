@@ -5,13 +5,13 @@ from dataclasses import FrozenInstanceError, fields
 
 import numpy as np
 import pytest
-from calibration_cases import GRAVITY, MULTI
+from calibration_cases import GRAVITY, MULTI, calibrate
 from every_item import every
 from recordings import pose_recording
 
 from gfimu.base.errors import InputError
 from gfimu.calibration.error_model import GAUGES
-from gfimu.calibration.methods import CalibrationTask, calibrate, run_calibration
+from gfimu.calibration.methods import CalibrationTask, run_calibration
 from gfimu.calibration.registry import METHODS, CalibrationMethod, calibration_method
 
 

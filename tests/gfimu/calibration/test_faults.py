@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from calibration_cases import FACES, GRAVITY, MULTI
+from calibration_cases import FACES, GRAVITY, MULTI, calibrate
 from recordings import pose_recording
 
 from gfimu.base.errors import InputError
-from gfimu.calibration.methods import METHODS, calibrate, calibrate_gyro
+from gfimu.calibration.methods import METHODS
 from gfimu.calibration.observations import averaged_poses, denoised_samples, every_sample, observations_from
 from gfimu.recording import Recording
 from gfimu.recording.rest import detect_rest
@@ -162,4 +162,4 @@ def test_no_rest_no_triads_no_method(triad):
     with pytest.raises(InputError, match="unknown input 'cooked'"):
         calibrate("multi-position", recording, input_kind="cooked")
     with pytest.raises(InputError, match="lacks gyro_x_rad_s"):
-        calibrate_gyro(recording)
+        calibrate("gyro", recording)

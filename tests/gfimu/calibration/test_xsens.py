@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from calibration_cases import calibrate
 
 from gfimu.base.errors import InputError
 from gfimu.calibration.imu_tk import read_text_triad
-from gfimu.calibration.methods import calibrate
 from gfimu.calibration.multi_position import multi_position
 from gfimu.calibration.observations import averaged_poses, every_sample
 from gfimu.recording.rest import detect_rest

@@ -1,9 +1,17 @@
 """What an array of low rank gives nevertheless, in words."""
 
 import numpy as np
+import pytest
 
 from gfimu.array.array import AccelerometerArray, Chip
-from gfimu.rate.axis.few_motions import few_motions_text
+from gfimu.base.errors import GeometryError
+from gfimu.rate.axis.few_motions import require_motions_of_samples
+
+
+def few_motions_text(array, sample_rate):
+    with pytest.raises(GeometryError) as refusal:
+        require_motions_of_samples(array, sample_rate)
+    return str(refusal.value)
 
 
 def test_one_chip_gives_its_force_and_names_the_axis_option():
