@@ -32,7 +32,7 @@ from gfimu.calibration.parameter_names import KINDS, cubic_names, kind_of, param
 from gfimu.calibration.valid_covariance import require_covariance, require_finite
 from gfimu.recording import Recording
 
-__all__ = ["FORMAT_VERSION", "Calibration", "CalibrationParameter", "load_calibration"]
+__all__ = ["FORMAT_VERSION", "Calibration", "CalibrationParameter", "load_calibration", "read_json"]
 
 FORMAT = "gfimu-calibration"
 FORMAT_VERSION = 1
@@ -463,11 +463,15 @@ def load_calibration(path: str | Path) -> Calibration:
     >>> import gfimu
     >>> gfimu.load_calibration("cal.json").apply(run)  # doctest: +SKIP
     """
+    return Calibration.from_dict(read_json(path, "not a calibration file"), source=str(path))
+
+
+def read_json(path: str | Path, nothing_known: str) -> Any:
+    """Return the content of the JSON file of a calibration; raises `InputError`, which says what another file is."""
     file = check_input(path, largest=LARGEST_TEXT)
     try:
-        data = json.loads(file.read_text(encoding="utf-8"))
+        return json.loads(file.read_text(encoding="utf-8"))
     except OSError as error:
         raise InputError(f"{file}: {error.strerror or error}; check the path") from None
     except (ValueError, RecursionError):  # also of whole numbers with thousands of digits
-        raise InputError(f"{file}: not a calibration file; make one with `gfimu calibrate`") from None
-    return Calibration.from_dict(data, source=str(file))
+        raise InputError(f"{file}: {nothing_known}; make one with `gfimu calibrate`") from None

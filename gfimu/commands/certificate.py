@@ -11,7 +11,6 @@ gfimu certificate calibration.json --array cube12 --rest rest.parquet
 gfimu certificate calibration.json --compare theirs.json
 """
 
-import json
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -133,22 +132,14 @@ def _certified(
 
 def _other(other: "Calibration | Certificate | str | Path", name: str) -> "Certificate":
     """Return a certificate given as such, as a calibration, or as the file of either."""
-    from gfimu.base.errors import InputError
-    from gfimu.base.files.input_file import LARGEST_TEXT, check_input
     from gfimu.calibration.certificate.certificate import FORMAT, Certificate
-    from gfimu.calibration.result import Calibration
+    from gfimu.calibration.result import Calibration, read_json
 
     if isinstance(other, Certificate):
         return other
     if isinstance(other, Calibration):
         return _certified(other, None, source=name)
-    file = check_input(other, largest=LARGEST_TEXT)
-    try:
-        data = json.loads(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"{file}: {error.strerror or error}; check the path") from None
-    except (ValueError, RecursionError):
-        raise InputError(f"{file}: neither a calibration nor a certificate; make one with `gfimu calibrate`") from None
+    data = read_json(other, "neither a calibration nor a certificate")
     if isinstance(data, dict) and data.get("format") == FORMAT:
         return Certificate.from_dict(data, source=name)
     return _certified(Calibration.from_dict(data, source=name), None, source=name)

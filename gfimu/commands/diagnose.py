@@ -295,8 +295,7 @@ def write_report(diagnosis: "Diagnosis", folder: str | Path) -> Path:
     from gfimu.diagnosis.report.folder import write_diagnosis
 
     check_outputs([("folder", folder, FOLDER)])
-    text, more = _twin_files(diagnosis)
-    written = write_diagnosis(folder, diagnosis, twin_toml=text, more=more, rig=drawn_rig(diagnosis))
+    written = write_diagnosis(folder, diagnosis, more=_twin_files(diagnosis), rig=drawn_rig(diagnosis))
     return written.get("report", written["verdict"])
 
 
@@ -304,26 +303,21 @@ def _written_files(diagnosis: "Diagnosis", folder: str | Path) -> dict[str, Path
     """Return the files that `write_report` writes to a folder, by what they are called."""
     from gfimu.diagnosis.report.folder import files_of
 
-    names = files_of(diagnosis, _twin_files(diagnosis)[1])
+    names = files_of(diagnosis, _twin_files(diagnosis))
     return {meaning: Path(folder) / name for name, meaning in names.items()}
 
 
-def _twin_files(diagnosis: "Diagnosis") -> tuple[str, dict[str, str]]:
-    """Return the text of the extended twin's file, and the texts of files that it names, by file name."""
+def _twin_files(diagnosis: "Diagnosis") -> dict[str, str]:
+    """Return the texts of array file and twin file where the array is no shipped one, and moves with the twin."""
     import tomli_w
 
     from gfimu.base.files.model_files import list_models
     from sim.twin import Twin
 
     twin = diagnosis.twin
-    if not isinstance(twin, Twin):
-        return twin.to_toml(), {}
-    content, more = twin.to_dict(), {}
-    if twin.array_name not in list_models("arrays"):
-        # An array file of the user's, and a calibrated one, is named relative to the twin file: it moves with it.
-        content["array"] = "array.toml"
-        more["array.toml"] = twin.array.to_toml()
-    return tomli_w.dumps(content), more
+    if not isinstance(twin, Twin) or twin.array_name in list_models("arrays"):
+        return {}
+    return {"twin.toml": tomli_w.dumps({**twin.to_dict(), "array": "array.toml"}), "array.toml": twin.array.to_toml()}
 
 
 def drawn_rig(diagnosis: "Diagnosis") -> "DrawnRig | None":

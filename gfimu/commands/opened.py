@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
 __all__ = [
     "as_array",
-    "as_arrays",
     "as_calibrated_run",
     "as_calibration",
     "as_runs",
@@ -51,15 +50,6 @@ def as_array(array: AccelerometerArray | str | Path) -> AccelerometerArray:
         return drawn
 
     return AccelerometerArray.load(array)
-
-
-def as_arrays(
-    arrays: AccelerometerArray | str | Path | Sequence[AccelerometerArray | str | Path],
-) -> list[AccelerometerArray]:
-    """Return one or several arrays, each given as `as_array` takes it."""
-    from gfimu.array.array import AccelerometerArray
-
-    return [as_array(one) for one in ([arrays] if isinstance(arrays, AccelerometerArray | str | Path) else arrays)]
 
 
 def as_source(

@@ -11,17 +11,17 @@ gfimu score one_chip --axis z --axis-point -0.1 0 0 --lever-std-m 0.003 --rotati
 
 import math
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from gfimu.base.errors import InputError
 from gfimu.commands.known_axis import AXIS, AxisLike, as_known_axis
-from gfimu.commands.opened import as_arrays
+from gfimu.commands.opened import as_array
 from gfimu.commands.shell.declare import Option, command
 from gfimu.commands.shell.options import ARRAYS, DURATION, RATE, SPEED_RAD_S
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from pathlib import Path
 
     from numpy.typing import ArrayLike
 
@@ -77,6 +77,7 @@ def score(
     >>> [f"{one.name} {one.gdop:.3f}" for one in gfimu.score(["cube12", "corners8"]).rigid]
     ['cube12 1.061', 'corners8 0.750']
     """
+    from gfimu.array.array import AccelerometerArray
     from gfimu.array.observability import seeing_arrays
     from gfimu.array_search.scores import Scores
     from gfimu.array_search.scoring import score as score_arrays
@@ -86,7 +87,8 @@ def score(
         raise InputError(f"--speed-rad-s {speed_rad_s}: must be a number of at most {_FASTEST:g}")
     omega = [speed_rad_s * component for component in _AXES[spin_axis]] if omega_rad_s is None else omega_rad_s
     said, scores = as_known_axis(axis), list["Score | AxisBounds"]()
-    for array in as_arrays(arrays or seeing_arrays()):
+    several = [arrays] if isinstance(arrays, AccelerometerArray | str | Path) else arrays or seeing_arrays()
+    for array in map(as_array, several):
         about = said.of(array)
         if about is None:
             faults = fault_protection(
