@@ -152,7 +152,7 @@ def estimate(
     about = replace(as_known_axis(axis), inclination_rad=None).of(geometry)
     start = None if unknown_start else omega0
     if about is None:
-        require_motions_of_samples(geometry, run.sample_rate)
+        require_motions_of_samples(geometry, run)
         there = place.of(run)
         solve = estimate_from_rest if rest_bias else estimate_with_biases
         with naming(name_of(recording)):

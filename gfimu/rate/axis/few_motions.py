@@ -8,19 +8,20 @@ from gfimu.array.array import AccelerometerArray
 from gfimu.array.observability import MOTION_NAMES, RANK_TOLERANCE, unseen_motions
 from gfimu.array.parts.part import white_noise_std
 from gfimu.base.errors import GeometryError, InputError
+from gfimu.recording import Recording
 
 __all__ = ["require_motions_of_samples"]
 
 
-def require_motions_of_samples(array: AccelerometerArray, sample_rate: float) -> None:
+def require_motions_of_samples(array: AccelerometerArray, recording: Recording) -> None:
     """Refuse an array of low rank: the motions that single samples give with their σ, those they don't, what helps.
 
     Parameters
     ----------
     array : AccelerometerArray
         The array.
-    sample_rate : float
-        Rate of the samples, Hz, which sets their white noise by the data sheets.
+    recording : Recording
+        A recording of it, whose sample rate sets the white noise of its samples by the data sheets.
 
     Raises
     ------
@@ -30,7 +31,7 @@ def require_motions_of_samples(array: AccelerometerArray, sample_rate: float) ->
     if not (unseen := unseen_motions(array)):
         return
     try:
-        noise = white_noise_std(array, sample_rate)
+        noise = white_noise_std(array, recording.sample_rate)
     except InputError:  # a part without data sheet
         noise = np.full(array.n_channels, np.nan)
     scale = np.array([array.length_unit] * 3 + [1.0] * 3)
@@ -42,8 +43,7 @@ def require_motions_of_samples(array: AccelerometerArray, sample_rate: float) ->
         for place, name in enumerate(MOTION_NAMES)
         if np.allclose(resolution[place], np.eye(6)[place], atol=1e-6)
     ]
-    whole = [chip.name for chip in array.chips if np.linalg.matrix_rank(chip.axes) == 3]
-    if whole:
+    if whole := [chip.name for chip in array.chips if np.linalg.matrix_rank(chip.axes) == 3]:
         given.append(f"the specific force at {', '.join(whole)}")
     gives = f"gives {', '.join(given)} per sample, but " if given else ""
     raise GeometryError(

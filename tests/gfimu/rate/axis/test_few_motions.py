@@ -6,11 +6,13 @@ import pytest
 from gfimu.array.array import AccelerometerArray, Chip
 from gfimu.base.errors import GeometryError
 from gfimu.rate.axis.few_motions import require_motions_of_samples
+from gfimu.recording import Recording
 
 
 def few_motions_text(array, sample_rate):
+    recording = Recording.from_arrays(np.arange(20) / sample_rate, np.zeros((20, array.n_channels)), array)
     with pytest.raises(GeometryError) as refusal:
-        require_motions_of_samples(array, sample_rate)
+        require_motions_of_samples(array, recording)
     return str(refusal.value)
 
 
