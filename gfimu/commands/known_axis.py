@@ -71,7 +71,7 @@ def as_known_axis(axis: AxisLike) -> KnownAxis:
 _AXIS = Option("Axis about which alone the array turns: x, y, z or 0,0,1. Few chips then suffice.", "AXIS")
 _HUB = Option("With --axis: fixed (a table) or free (a wheel on a moving body).", "KIND")
 _INCLINATION = Option(
-    "Angle between --axis and the vertical, rad; else from the data, or 0 (a free hub: π/2) where there are none.",
+    "Angle between the axis and the vertical, rad; else from the data, or 0 (a free hub: π/2) where there are none.",
     "RAD",
 )
 _DIRECTION = Option("With --axis: how exactly its direction is known, rad.", "RAD")

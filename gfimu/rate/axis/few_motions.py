@@ -39,9 +39,9 @@ def require_motions_of_samples(array: AccelerometerArray, recording: Recording) 
     resolution = inverse @ array.regression_matrix * (scale / scale[:, None])
     std = np.sqrt(inverse**2 @ noise**2)
     given = [
-        f"{name} (σ {std[place]:.2g} {'rad/s²' if place < 3 else 'm/s²'})" if np.isfinite(std[place]) else name
-        for place, name in enumerate(MOTION_NAMES)
-        if np.allclose(resolution[place], np.eye(6)[place], atol=1e-6)
+        f"{name} (σ {std[index]:.2g} {'rad/s²' if index < 3 else 'm/s²'})" if np.isfinite(std[index]) else name
+        for index, name in enumerate(MOTION_NAMES)
+        if np.allclose(resolution[index], np.eye(6)[index], atol=1e-6)
     ]
     if whole := [chip.name for chip in array.chips if np.linalg.matrix_rank(chip.axes) == 3]:
         given.append(f"the specific force at {', '.join(whole)}")
