@@ -3,16 +3,13 @@
 import numpy as np
 import pytest
 
-from gfimu.array.array import AccelerometerArray, Chip
-from gfimu.base.errors import GeometryError
-from gfimu.rate.axis.few_motions import require_motions_of_samples
-from gfimu.recording import Recording
+from gfimu import AccelerometerArray, Chip, GeometryError, Recording, estimate
 
 
 def few_motions_text(array, sample_rate):
     recording = Recording.from_arrays(np.arange(20) / sample_rate, np.zeros((20, array.n_channels)), array)
     with pytest.raises(GeometryError) as refusal:
-        require_motions_of_samples(array, recording)
+        estimate(recording, array)
     return str(refusal.value)
 
 
