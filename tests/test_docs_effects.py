@@ -11,9 +11,9 @@ import pytest
 from every_item import every
 from test_docs_words import VAGUE
 
-from gfimu.base.errors import InputError
+from gfimu import InputError
+from gfimu.diagnosis import Policy
 from gfimu.diagnosis.design.proposal import SEPARATED
-from gfimu.diagnosis.policy import Policy
 from gfimu.model.effect_catalogue import effect_catalogue
 from sim.effects import (
     BODY_EFFECTS,
@@ -24,9 +24,9 @@ from sim.effects import (
     Effect,
     Size,
     catalogue,
+    describe,
 )
 from sim.effects.catalogue import PLACES, essence, every_effect, place_of
-from sim.effects.description import describe
 from sim.scenarios import Scenario
 
 MOST_BYTES, MOST_OF_ALL = 60_000, 3_000_000

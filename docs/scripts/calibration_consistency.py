@@ -23,7 +23,7 @@ from gfimu.array.kinematics import specific_force
 from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.calibration.error_model import ErrorModel
 from gfimu.calibration.method import CalibrationTask, run_calibration
-from gfimu.calibration.registry import METHODS
+from gfimu.calibration.registry import METHODS, calibration_method
 from gfimu.calibration.result import Calibration
 from gfimu.recording import Recording
 from gfimu.recording.carried_array import array_metadata
@@ -126,7 +126,7 @@ def normalised_errors(
         )
         drawing = poses.array if method == "array" else None
         task = CalibrationTask(recording, n_parameters=parameters, array=drawing, **levelled)
-        result = run_calibration(METHODS[method], task)
+        result = run_calibration(calibration_method(method), task)
         error, std = result.values - truth_of(result, poses.array, models), result.std
         if method == "multi-position" and result.null_space.size:  # the rotation stays at its start: compare the rest
             shown = np.eye(len(error)) - result.null_space @ result.null_space.T

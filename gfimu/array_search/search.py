@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from gfimu.array.array import AccelerometerArray, Chip
 from gfimu.array.array_file import ArrayFile
@@ -23,18 +23,17 @@ from gfimu.array.kinematics import require_all_motions
 from gfimu.array_search.certificate import Certificate, certify
 from gfimu.array_search.criteria import Goal
 from gfimu.array_search.exchange import exchange, log_figure
-from gfimu.array_search.objectives import Conditions, Objective, Reached, objective
+from gfimu.array_search.objectives import Objective, Reached
 from gfimu.array_search.polish import feasible, leaks, polish
 from gfimu.array_search.problem import Design, Problem
 from gfimu.array_search.scores import score_tables
 from gfimu.array_search.scoring import Score, score, score_panels
-from gfimu.array_search.shapes import box
 from gfimu.base.declared import Declared, Table, cell, figure
 from gfimu.base.errors import GeometryError, InputError
 from gfimu.base.results import Panel, PlottedResult
 from gfimu.base.short_repr import short_repr
 
-__all__ = ["Found", "SearchResult", "best_design", "optimize", "search"]
+__all__ = ["Found", "SearchResult", "best_design", "search"]
 
 _Vector = NDArray[np.float64]
 
@@ -118,53 +117,6 @@ class SearchResult(Declared, PlottedResult):
         yield f"{self.agreeing} of {self.starts} starts agree on it{near}"
         none = "certificate: none; no lower bound is known for this objective and these chips"
         yield none if self.certificate is None else self.certificate.text
-
-
-def optimize(
-    n_chips: int,
-    *,
-    rng: np.random.Generator,
-    axes_per_chip: int = 3,
-    box_m: ArrayLike = (0.1, 0.1, 0.1),
-    min_spacing_m: float = 0.005,
-    non_recursive: bool = False,
-    restarts: int = 40,
-    part: str = "adxl345",
-    report: Callable[[float], None] | None = None,
-) -> SearchResult:
-    """Search the array of least GDOP inside a box centred at the body origin.
-
-    Parameters
-    ----------
-    n_chips : int
-        Number of chips.
-    rng : numpy.random.Generator
-        Source of the random starts.
-    axes_per_chip : int
-        Sensing axes of a chip: 1, 2 or 3.
-    box_m : array_like, shape (3,)
-        Edges of the box along body x, y, z, m; zero makes it flat.
-    min_spacing_m : float
-        Least distance between two chips, m.
-    non_recursive : bool
-        Accept only arrays whose α = (S a)₁…₃ is free of ω².
-    restarts : int
-        Most starts that are made.
-    part : str
-        Part of the chips in the result.
-    report : callable, optional
-        Called with the share of the starts that is done.
-
-    Raises
-    ------
-    GeometryError
-        If no array of these chips in this box sees all six motions, or none is free of ω² where that is asked.
-    InputError
-        If an argument is out of range or the chips don't fit at that spacing.
-    """
-    problem = Problem(n_chips, axes_per_chip, box(box_m), (), min_spacing_m, non_recursive=non_recursive)
-    conditions = Conditions(part=part)
-    return search(problem, objective("gdop", problem, conditions), rng, starts=restarts, part=part, report=report)
 
 
 def search(

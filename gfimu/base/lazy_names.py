@@ -49,7 +49,7 @@ def declared_names(
 
 
 def homes_of(package: str) -> dict[str, str]:
-    """Return the module of each name that a package, which is imported, declares."""
+    """Return the module of each name that a package or module, which is imported, imports for type checkers only."""
     source = Path(str(sys.modules[package].__file__)).read_text(encoding="utf-8")
     blocks = [node for node in ast.parse(source).body if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node)]
     imports = [node for block in blocks for node in block.body if isinstance(node, ast.ImportFrom)]

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from gfimu.calibration.error_model import ErrorModel, free_elements
     from gfimu.calibration.imu_tk import read_text_triad
     from gfimu.calibration.known_poses import levelling_covariance
-    from gfimu.calibration.methods import calibrate
     from gfimu.calibration.multi_position import multi_position_gyro
     from gfimu.calibration.observations import Observations, averaged_poses, every_sample
     from gfimu.calibration.registry import METHODS

@@ -11,7 +11,7 @@ turntable does (`gfimu.calibration.spin`).
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from gfimu.array.array import AccelerometerArray
 from gfimu.array.parts.part_file import PartFile
@@ -20,7 +20,7 @@ from gfimu.calibration.gauss_helmert import Condition
 from gfimu.calibration.observations import Observations
 from gfimu.recording import Recording
 
-__all__ = ["cubic_std", "quadratic_statement", "quadratic_std", "with_quadratic", "without_quadratic"]
+__all__ = ["cubic_std", "quadratic_statement", "quadratic_std", "with_quadratic"]
 
 Floats = NDArray[np.float64]
 
@@ -102,11 +102,6 @@ def quadratic_statement(observations: Observations) -> tuple[str, ...]:
         "coefficients q are estimated with the other parameters and are in their standard deviations"
     )
     return (text,)
-
-
-def without_quadratic(readings: Floats, bias: ArrayLike, quadratic: ArrayLike) -> Floats:
-    """Return the straight readings b + y of bent ones b + y + q y², to second order: l − q (l − b)², shape (..., c)."""
-    return np.asarray(readings - np.asarray(quadratic) * (readings - np.asarray(bias)) ** 2, dtype=np.float64)
 
 
 def with_quadratic(condition: Condition, biases: NDArray[np.intp]) -> Condition:

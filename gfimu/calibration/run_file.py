@@ -15,8 +15,7 @@ from gfimu.calibration.result import Calibration
 from gfimu.recording import Recording
 from gfimu.recording.carried_array import array_difference
 from gfimu.recording.formats import format_of_recording, open_run
-from gfimu.recording.mapped import MappedFile, mapped_reference
-from gfimu.recording.tables.arrow import ArrowStream
+from gfimu.recording.mapped import MappedFile, RecordingSource, mapped_reference
 from gfimu.recording.tables.column_file import open_columns
 
 __all__ = ["open_calibrated", "open_calibrated_run", "open_references", "open_uncalibrated"]
@@ -24,9 +23,7 @@ __all__ = ["open_calibrated", "open_calibrated_run", "open_references", "open_un
 _TEXT = (".txt", ".txt.gz")
 
 
-def open_uncalibrated(
-    path: str | Path | MappedFile | ArrowStream, *, array: AccelerometerArray | None = None
-) -> Recording:
+def open_uncalibrated(path: RecordingSource, *, array: AccelerometerArray | None = None) -> Recording:
     """Read a recording to calibrate from: raw counts stay counts, other units become m/s².
 
     CSV and Parquet recordings, MIMU4444 streams, and plain text of rows ``time x y z`` (``.txt``, ``.txt.gz``) as
@@ -40,7 +37,7 @@ def open_uncalibrated(
     return _open(path, array, None)
 
 
-def open_references(path: str | Path | MappedFile | ArrowStream) -> Recording:
+def open_references(path: RecordingSource) -> Recording:
     """Read a recording that may hold references alone, such as a gyro on a rate table.
 
     Raises
@@ -48,6 +45,8 @@ def open_references(path: str | Path | MappedFile | ArrowStream) -> Recording:
     InputError
         As `gfimu.Recording.read`, `gfimu.recording.mapped.mapped_reference` and the importers.
     """
+    if isinstance(path, Recording):
+        return path
     if isinstance(path, MappedFile) and path.column_map.reference and not path.column_map.channels:
         t, columns, _ = mapped_reference(path.path, path.column_map)
         return Recording(t, np.empty((len(t), 0)), (), columns)
@@ -59,21 +58,21 @@ def open_references(path: str | Path | MappedFile | ArrowStream) -> Recording:
     return Recording.read(path, needs_channels=False)
 
 
-def open_calibrated(
-    path: str | Path | MappedFile | ArrowStream, calibration: Calibration, *, array: AccelerometerArray | None = None
-) -> Recording:
-    """Read a recording in the unit of a calibration and correct it.
+def open_calibrated(path: RecordingSource, calibration: Calibration | None) -> Recording:
+    """Read a recording in the unit of a calibration and correct it; without one as `open_uncalibrated`.
 
     Raises
     ------
     InputError
         As `gfimu.Recording.read`, or if the calibration does not fit the recording.
     """
-    return calibration.apply(_open(path, array, "lsb" if calibration.unit == "lsb" else "m_s2"))
+    if calibration is None:
+        return open_uncalibrated(path)
+    return calibration.apply(_open(path, None, "lsb" if calibration.unit == "lsb" else "m_s2"))
 
 
 def open_calibrated_run(
-    path: str | Path | MappedFile | ArrowStream, calibration: Calibration, array: AccelerometerArray | None = None
+    path: RecordingSource, calibration: Calibration, array: AccelerometerArray | None = None
 ) -> tuple[Recording, AccelerometerArray]:
     """Read a recording with its array and correct both: readings by the error models, positions where fitted.
 
@@ -83,13 +82,15 @@ def open_calibrated_run(
         As `gfimu.recording.formats.open_run`, or if the calibration does not fit the recording.
     """
     recording, geometry = open_run(path, array)
-    if calibration.unit == "lsb":
+    if calibration.unit == "lsb" and not isinstance(path, Recording):
         if isinstance(path, MappedFile):
             recording = path.read(geometry, unit="lsb")
         elif format_of_recording(path) is None:
             recording = Recording.read(path, array=geometry, unit="lsb")
     corrected, calibrated = calibration.apply(recording), calibration.calibrated_array(geometry)
-    if _carries(recording, geometry):  # another array of its own stays in it, so that the difference is reported
+    if not isinstance(path, Recording) and _carries(
+        recording, geometry
+    ):  # another array of its own stays in it, so that the difference is reported
         corrected = corrected.carrying(calibrated)
     return corrected, calibrated
 
@@ -103,7 +104,9 @@ def _carries(recording: Recording, array: AccelerometerArray) -> bool:
     return own is not None and not array_difference(own, array)
 
 
-def _open(path: str | Path | MappedFile | ArrowStream, array: AccelerometerArray | None, unit: str | None) -> Recording:
+def _open(path: RecordingSource, array: AccelerometerArray | None, unit: str | None) -> Recording:
+    if isinstance(path, Recording):
+        return path
     if isinstance(path, MappedFile):
         return path.read(array, unit=unit)
     if isinstance(path, str | Path) and str(path).endswith(_TEXT) and is_ordinary(path):

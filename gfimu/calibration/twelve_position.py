@@ -28,7 +28,7 @@ from gfimu.calibration.nonlinearity import quadratic_statement, with_quadratic
 from gfimu.calibration.observations import Observations
 from gfimu.calibration.result import Calibration
 
-__all__ = ["coarse_solution", "rotation_directions", "twelve_position"]
+__all__ = ["coarse_solution", "twelve_position"]
 
 Floats = NDArray[np.float64]
 
@@ -60,17 +60,6 @@ def coarse_solution(observations: Observations, gravity: float) -> ErrorModel:
     solution = np.linalg.lstsq(design, references, rcond=None)[0].T  # rows: (offset, W) per axis
     w = solution[:, 1:] / size
     return ErrorModel.from_voltage(solution[:, 0] - w @ centre, w)
-
-
-def rotation_directions(model: ErrorModel) -> Floats:
-    """Return the parameter changes that common rotations of the axes about x, y, z make, (12, 3), orthonormal columns.
-
-    A rotation of the frame by δ changes M by −M [δ×] and no magnitude.
-    """
-    columns = [
-        np.concatenate([(-model.sensitivity @ np.cross(np.eye(3), axis)).ravel(), np.zeros(3)]) for axis in np.eye(3)
-    ]
-    return np.asarray(np.linalg.qr(np.column_stack(columns))[0], dtype=np.float64)
 
 
 def twelve_position(

@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from gfimu.base.errors import InputError, unknown_name
 from gfimu.base.files.outputs import OutputFile, OutputFolder
 from gfimu.base.optional_packages import require
-from gfimu.base.plugins import user_function
 from gfimu.commands.shell.declare import Option, command
 from gfimu.commands.shell.options import DATA, LIMIT, SETS, SPLIT, WORKERS
+from gfimu.model.user_code import user_function
 
 if TYPE_CHECKING:
     from gfimu.commands.benchmark_results import BenchmarkList, BenchmarkRun, BenchmarkWorlds

@@ -17,12 +17,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from gfimu.base.files.outputs import OutputFolder
+from gfimu.commands import given
 from gfimu.commands.shell.declare import Option, command
-from gfimu.commands.shell.options import ARRAY, MAX_MEMORY
+from gfimu.commands.shell.options import ARRAY
 
 if TYPE_CHECKING:
-    from gfimu.array.array import AccelerometerArray
-    from gfimu.base.files.memory import MemorySize
     from gfimu.calibration.certificate.certificate import Certificate, Component, Sheet
     from gfimu.calibration.certificate.stage.stage import Stage
     from gfimu.calibration.result import Calibration
@@ -36,14 +35,14 @@ _SEED = 0
 FOLDER = OutputFolder(("certificate.json", "certificate.html"), meanings=("certificate", "page"))
 """What a certificate writes."""
 
-_CALIBRATION = Option("Calibration file, from `gfimu calibrate`.", "CAL", kind=Path, argument=True, reads=True)
-_COMPARE = Option("Another calibration or certificate of the same chips: E_n of each quantity.", kind=Path, reads=True)
-_STAGE = Option(
-    "Errors of stage and gravity, for the budget (.toml); gfimu new stage writes one to edit.", kind=Path, reads=True
-)
+_CALIBRATION = Option("Calibration file, from `gfimu calibrate`.", "CAL", argument=True, reads=True)
+_COMPARE = Option("Another calibration or certificate of the same chips: E_n of each quantity.", reads=True)
+_STAGE = Option("Errors of stage and gravity, for the budget (.toml); gfimu new stage writes one to edit.", reads=True)
 _REST = Option(
     "Recording at rest: noise and bias of that sheet; else the data sheets of the parts.", kind=Path, reads=True
 )
+_COMPONENTS = Option("Further components of type B for the budget, by name of the term.", shell=False)
+_SENSOR = Option("The array as an angular sensor, in place of ``array`` and ``rest``.", shell=False)
 
 
 @command(doing="stating the calibration")
@@ -51,26 +50,17 @@ def certificate(
     calibration: Annotated["Calibration | str | Path", _CALIBRATION],
     *,
     out: Annotated[
-        "str | Path | None",
-        Option("Folder to write: certificate.json, certificate.html.", kind=Path, writes=FOLDER),
+        "str | Path | None", Option("Folder to write: certificate.json, certificate.html.", writes=FOLDER)
     ] = None,
     compare: Annotated["Calibration | Certificate | str | Path | None", _COMPARE] = None,
     stage: Annotated["Stage | str | Path | None", _STAGE] = None,
-    array: Annotated[
-        "AccelerometerArray | str | Path | None", ARRAY.also(". Adds its sheet as an angular sensor (IEEE 671)")
-    ] = None,
+    array: Annotated[given.Array, ARRAY.also(". Adds its sheet as an angular sensor (IEEE 671)")] = None,
     rest: Annotated["RecordingLike | None", _REST] = None,
     item: Annotated[str, Option("What was calibrated: part, serial number.")] = "",
     date: Annotated[str, Option("When it was calibrated.")] = "",
-    max_memory: Annotated["MemorySize | None", MAX_MEMORY] = None,
-    components: Annotated[
-        "Iterable[Component]",
-        Option("Further components of type B for the budget, by name of the term.", shell=False),
-    ] = (),
-    angular_sensor: Annotated[
-        "Sheet | None",
-        Option("The array as an angular sensor, in place of ``array`` and ``rest``.", shell=False),
-    ] = None,
+    max_memory: given.Memory = None,
+    components: Annotated["Iterable[Component]", _COMPONENTS] = (),
+    angular_sensor: Annotated["Sheet | None", _SENSOR] = None,
 ) -> "Certificate":
     """State a calibration in the terms of IEEE 1293 and NIST, with expanded uncertainties and their budget.
 
@@ -90,21 +80,28 @@ def certificate(
     >>> import gfimu
     >>> gfimu.certificate("cal.json", item="unit 7").to_pandas()  # doctest: +SKIP
     """
+    from gfimu.calibration.certificate.angular import angular_sensor_sheet
     from gfimu.calibration.certificate.comparison import compare as compared
     from gfimu.calibration.certificate.page import write_certificate
     from gfimu.calibration.certificate.stage.stage import Stage
-    from gfimu.commands.opened import as_calibration
+    from gfimu.commands.opened import as_array, as_calibrated_run, as_calibration, as_source
 
-    source = str(calibration) if isinstance(calibration, str | Path) else "calibration"
     fitted = as_calibration(calibration)
+    if rest is not None:
+        source = as_source(rest, array, max_memory=max_memory)
+        geometry = as_calibrated_run(source, array)[1]
+        corrected, _ = as_calibrated_run(source, array, fitted)
+        angular_sensor = angular_sensor_sheet(fitted, geometry, rest=corrected)
+    elif array is not None:
+        angular_sensor = angular_sensor_sheet(fitted, as_array(array))
     found = _certified(
         fitted,
         Stage.load(stage) if isinstance(stage, str | Path) else stage,
         components=components,
-        angular_sensor=_sheet(fitted, array, rest, max_memory) or angular_sensor,
+        source=str(calibration) if isinstance(calibration, str | Path) else "calibration",
         item=item,
         date=date,
-        source=source,
+        angular_sensor=angular_sensor,
     )
     if compare is not None:
         name = str(compare) if isinstance(compare, str | Path) else "the other"
@@ -112,23 +109,6 @@ def certificate(
     if out is not None:
         write_certificate(out, found)
     return found
-
-
-def _sheet(
-    calibration: "Calibration",
-    array: "AccelerometerArray | str | Path | None",
-    rest: "RecordingLike | None",
-    max_memory: "MemorySize | None",
-) -> "Sheet | None":
-    """Return the sheet of the array as an angular sensor; None where neither array nor recording is given."""
-    from gfimu.calibration.certificate.angular import angular_sensor_sheet
-    from gfimu.commands.opened import as_array, as_calibrated_run, as_run, as_source
-
-    if rest is None:
-        return None if array is None else angular_sensor_sheet(calibration, as_array(array))
-    source = as_source(rest, array, max_memory=max_memory)
-    corrected, _ = as_calibrated_run(source, array, calibration)
-    return angular_sensor_sheet(calibration, as_run(source, array)[1], rest=corrected)
 
 
 def _certified(
@@ -150,17 +130,17 @@ def _certified(
     return replace(found, statements=(*found.statements, *simulated.statements))
 
 
-def _other(given: "Calibration | Certificate | str | Path", name: str) -> "Certificate":
+def _other(other: "Calibration | Certificate | str | Path", name: str) -> "Certificate":
     """Return a certificate given as such, as a calibration, or as the file of either."""
     from gfimu.calibration.certificate.certificate import FORMAT, Certificate
     from gfimu.calibration.result import Calibration
     from gfimu.recording.reading import read_json
 
-    if isinstance(given, Certificate):
-        return given
-    if isinstance(given, Calibration):
-        return _certified(given, None, source=name)
-    data = read_json(given, "neither a calibration nor a certificate; make one with `gfimu calibrate`")
+    if isinstance(other, Certificate):
+        return other
+    if isinstance(other, Calibration):
+        return _certified(other, None, source=name)
+    data = read_json(other, "neither a calibration nor a certificate; make one with `gfimu calibrate`")
     if isinstance(data, dict) and data.get("format") == FORMAT:
         return Certificate.from_dict(data, source=name)
     return _certified(Calibration.from_dict(data, source=name), None, source=name)

@@ -24,10 +24,11 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from gfimu.base.errors import InputError
+from gfimu.base.errors import InputError, unknown_name
+from gfimu.commands import given
 from gfimu.commands.shell.completion import words
 from gfimu.commands.shell.declare import Option, command
-from gfimu.commands.shell.options import ARRAY, MAP_OF_TABLE, MAX_MEMORY
+from gfimu.commands.shell.options import ARRAY, MAP_OF_TABLE
 from gfimu.commands.shell.output_files import EXPORT
 
 if TYPE_CHECKING:
@@ -38,27 +39,20 @@ if TYPE_CHECKING:
     from gfimu.base.files.memory import MemorySize
     from gfimu.calibration.result import Calibration
     from gfimu.commands.converted import Converted, ConvertedArray, ConvertedCalibration
-    from gfimu.commands.opened import Source
     from gfimu.recording import Recording
     from gfimu.recording.importing import ColumnMap
-    from gfimu.recording.mapped import RecordingLike
+    from gfimu.recording.mapped import RecordingLike, RecordingSource
     from gfimu.sensor_noise import RecordingNoise
 
 __all__ = ["convert"]
 
 
-def _results() -> tuple[type, ...]:
-    from gfimu.commands.converted import Converted, ConvertedArray, ConvertedCalibration
-
-    return Converted, ConvertedArray, ConvertedCalibration
-
-
 def _report(
-    found: "Recording | Calibration | AccelerometerArray", given: "Mapping[str, Any]"
+    found: "Recording | Calibration | AccelerometerArray", values: "Mapping[str, Any]"
 ) -> "Converted | ConvertedArray | ConvertedCalibration":
     from gfimu.commands.converted import converted
 
-    return converted(found, given)
+    return converted(found, values)
 
 
 def _kind_of(target: "str | Path") -> str:
@@ -66,54 +60,49 @@ def _kind_of(target: "str | Path") -> str:
     return {".xml": "model", ".yaml": "calibration", ".yml": "calibration"}.get(Path(target).suffix, "recording")
 
 
-@command(results=_results, report=_report, doing="converting")
+_SOURCE = Option(
+    "Recording: .csv, .parquet, a MIMU4444 stream, or with --map a foreign file, one per chip; or a calibration "
+    "(.json), or an array (a name or .toml).",
+    "SOURCE...",
+    kind=list[Path],
+    argument=True,
+    reads=True,
+)
+_TARGET = Option(
+    "File to write: .csv, .parquet, .mcap (ROS 2), .euroc (a folder); .yaml of a calibration; .xml of an array, for "
+    "MuJoCo.",
+    "TARGET",
+    argument=True,
+    needed=True,
+    writes=EXPORT,
+    what=_kind_of,
+)
+_DROP = Option(
+    "Rows to leave out, counted: corrupt, out_of_range, missing, duplicates, unordered.", "KIND,...", kind=str
+)
+_TO = Option(
+    "Of a calibration, the format: kalibr or ros. Of an array: turntable, motor_turntable or free_cube.",
+    "FORMAT",
+    offers=words("kalibr", "ros", "turntable", "motor_turntable", "free_cube"),
+)
+_COUNT = Option("Of a calibration for counts: m/s² per count, as the sensor's driver has it.")
+_NOISE = Option("Of a calibration: recording at rest, for noise and sample rate.", "FILE", reads=True)
+
+
+@command(report=_report, doing="converting")
 def convert(
-    source: Annotated[
-        "RecordingLike | Calibration | AccelerometerArray | Sequence[str | Path]",
-        Option(
-            "Recording: .csv, .parquet, a MIMU4444 stream, or with --map a foreign file, one per chip; "
-            "or a calibration (.json), or an array (a name or .toml).",
-            "SOURCE...", kind=list[Path], argument=True, reads=True,
-        ),
-    ],
-    target: Annotated[
-        "str | Path | None",
-        Option(
-            "File to write: .csv, .parquet, .mcap (ROS 2), .euroc (a folder); .yaml of a calibration; .xml of an "
-            "array, for MuJoCo.",
-            "TARGET", kind=Path, argument=True, needed=True, writes=EXPORT, what=_kind_of,
-        ),
-    ] = None,
+    source: Annotated["RecordingLike | Calibration | AccelerometerArray | Sequence[str | Path]", _SOURCE],
+    target: Annotated["str | Path | None", _TARGET] = None,
     *,
-    array: Annotated[
-        "AccelerometerArray | str | Path | None",
-        ARRAY.also("; its channels must be there, else every channel found is taken"),
-    ] = None,
-    column_map: Annotated["ColumnMap | str | Path | None", MAP_OF_TABLE] = None,
-    max_memory: Annotated["MemorySize | None", MAX_MEMORY] = None,
-    drop: Annotated[
-        "str | Sequence[str]",
-        Option(
-            "Rows to leave out, counted: corrupt, out_of_range, missing, duplicates, unordered.", "KIND,...", kind=str
-        ),
-    ] = "",
-    to: Annotated[
-        str | None,
-        Option(
-            "Of a calibration, the format: kalibr or ros. Of an array: turntable, motor_turntable or free_cube.",
-            "FORMAT",
-            offers=words("kalibr", "ros", "turntable", "motor_turntable", "free_cube"),
-        ),
-    ] = None,
-    lsb_m_s2: Annotated[
-        float | None, Option("Of a calibration for counts: m/s² per count, as the sensor's driver has it.")
-    ] = None,
+    array: Annotated[given.Array, ARRAY.also("; its channels must be there, else every channel found is taken")] = None,
+    column_map: Annotated[given.Map, MAP_OF_TABLE] = None,
+    max_memory: given.Memory = None,
+    drop: Annotated["str | Sequence[str]", _DROP] = "",
+    to: Annotated[str | None, _TO] = None,
+    lsb_m_s2: Annotated[float | None, _COUNT] = None,
     chip: Annotated[str | None, Option("Of a calibration: the one chip to export.")] = None,
-    noise: Annotated[
-        "RecordingNoise | Recording | str | Path | None",
-        Option("Of a calibration: recording at rest, for noise and sample rate.", "FILE", kind=Path, reads=True),
-    ] = None,
-) -> "Recording | Calibration | AccelerometerArray":  # fmt: skip
+    noise: Annotated["RecordingNoise | Recording | str | Path | None", _NOISE] = None,
+) -> "Recording | Calibration | AccelerometerArray":
     """Read a recording in any format that is known, in m/s², and write it as CSV, Parquet, MCAP or EuRoC.
 
     Or read a calibration and write it as Kalibr's or imu_calib's YAML; or an array and write it as a MuJoCo model.
@@ -136,67 +125,65 @@ def convert(
     >>> import gfimu
     >>> gfimu.convert("log.csv", "run.parquet", column_map="phyphox")  # doctest: +SKIP
     """
-    from gfimu.commands.export_array import export_array
-    from gfimu.commands.export_calibration import export_calibration
-    from gfimu.commands.opened import as_array
+    from gfimu.commands.opened import as_array, as_runs
 
-    drawn = _array(source, target)
+    sources = as_runs(source)  # type: ignore[arg-type]
+    alone = sources[0] if len(sources) == 1 else None
+    drawn = _array(alone, target)
     if drawn is not None:
         if (lsb_m_s2, chip, noise) != (None, None, None):
             raise InputError("--lsb-m-s2, --chip and --noise are for a calibration (.json, from gfimu calibrate)")
-        return export_array(drawn, target, to)
+        _write_array(drawn, target, to or "turntable")
+        return drawn
     drawing = None if array is None else as_array(array)
-    calibration = _calibration(source)
+    calibration = _calibration(alone)
     if calibration is not None:
-        export_calibration(
-            calibration,
-            target,
-            to=to,
-            array=drawing,
-            lsb_m_s2=lsb_m_s2,
-            chip=chip,
-            noise=noise,
-            column_map=column_map,
-            max_memory=max_memory,
-        )
+        from gfimu.base.files.atomic_file import write_text
+        from gfimu.calibration.exporting import TARGETS, calibrated_chips, notes_of
+        from gfimu.commands.noise import noise as recorded_noise
+        from gfimu.sensor_noise import RecordingNoise
+
+        if to is None:
+            raise InputError(f"a calibration is written for one of {', '.join(TARGETS)}; name it with --to")
+        if to not in TARGETS:
+            raise unknown_name("format of a calibration", to, TARGETS)
+        if target is not None and Path(target).suffix not in {".yaml", ".yml"}:
+            raise InputError(f"{target}: a calibration for {to} ends in .yaml or .yml; name it so")
+        if noise is not None and not isinstance(noise, RecordingNoise):
+            noise = recorded_noise(noise, calibration=calibration, column_map=column_map, max_memory=max_memory)
+        chips = calibrated_chips(calibration, drawing, lsb_m_s2=lsb_m_s2, noise=noise, chip=chip)
+        text = TARGETS[to](chips, notes=notes_of(calibration))
+        if target is not None:
+            write_text(target, text)
         return calibration
     if (to, lsb_m_s2, chip, noise) != (None, None, None, None):
         raise InputError("--to, --lsb-m-s2, --chip and --noise are for a calibration (.json, from gfimu calibrate)")
-    recording = _read(_given(source), drawing, column_map, drop, max_memory)
+    recording = _read(sources, drawing, _dropping(sources[0], column_map, drop), max_memory)
     if target is not None:
         _write(recording, Path(target))
     return recording
 
 
 def _read(
-    given: "list[RecordingLike]",
+    sources: "list[RecordingLike]",
     drawing: "AccelerometerArray | None",
     column_map: "ColumnMap | str | Path | None",
-    drop: "str | Sequence[str]",
     max_memory: "MemorySize | None",
 ) -> "Recording":
     """Return the recording that one source, or a file per chip, holds."""
     from gfimu.commands.opened import as_source, files_by_map, name_of
-    from gfimu.recording import Recording
     from gfimu.recording.carried_array import carried_array
     from gfimu.recording.checks import examine
     from gfimu.recording.formats import open_recording
-    from gfimu.recording.mapped import MappedFile
 
-    first, *others = given
-    if column_map is None and isinstance(first, MappedFile):
-        column_map = first.column_map
-    chosen = _dropping(column_map, drop)
-    source: Source
-    if chosen is not None and isinstance(first, str | Path):
-        source = files_by_map([one for one in given if isinstance(one, str | Path)], chosen)
+    first, *others = sources
+    if column_map is not None and isinstance(first, str | Path):
+        source: RecordingSource = files_by_map([one for one in sources if isinstance(one, str | Path)], column_map)
     elif others:
         raise InputError(f"{others[0]}: several files need --map, which says what the columns of each chip's file are")
     else:
-        source = as_source(first, drawing, chosen)
-    recording = (
-        source if isinstance(source, Recording) else open_recording(source, array=drawing, max_memory=max_memory)
-    )
+        source = as_source(first, drawing, column_map)
+    recording = open_recording(source, array=drawing, max_memory=max_memory)
     if recording.unit == "m_s2":
         examine(recording, drawing, source=name_of(source), force=True)  # a conversion is how a file is mended
     if drawing is not None:
@@ -208,11 +195,14 @@ def _read(
 
 
 def _dropping(
-    column_map: "ColumnMap | str | Path | None", drop: "str | Sequence[str]"
+    source: "RecordingLike", column_map: "ColumnMap | str | Path | None", drop: "str | Sequence[str]"
 ) -> "ColumnMap | str | Path | None":
-    """Return a column map that leaves out rows of some kinds, too."""
+    """Return the column map, by default the source's own, with the kinds of rows that are to be left out, too."""
     from gfimu.recording.importing import load_map
+    from gfimu.recording.mapped import MappedFile
 
+    if column_map is None and isinstance(source, MappedFile):
+        column_map = source.column_map
     kinds = drop if isinstance(drop, str) else ",".join(drop)
     return load_map(column_map, [f"drop={kinds}"]) if kinds else column_map
 
@@ -229,13 +219,23 @@ def _write(recording: "Recording", target: Path) -> None:
         recording.write(target)
 
 
+def _write_array(array: "AccelerometerArray", target: "str | Path | None", rig: str) -> None:
+    """Write an array as a MuJoCo model."""
+    from gfimu.base.files.atomic_file import write_text
+    from sim.rigs.mjcf_export import array_as_mjcf
+
+    if target is not None and Path(target).suffix != ".xml":
+        raise InputError(f"{target}: an array is written as a MuJoCo model; name it .xml")
+    text = array_as_mjcf(array, rig)
+    if target is not None:
+        write_text(target, text)
+
+
 def _array(source: object, target: "str | Path | None") -> "AccelerometerArray | None":
     """Return the array that is to be converted: one itself, or what is named where the target is a MuJoCo model."""
     from gfimu.array.array import AccelerometerArray
     from gfimu.commands.opened import as_array
 
-    if isinstance(source, list | tuple) and len(source) == 1:
-        source = source[0]
     if isinstance(source, AccelerometerArray):
         return source
     if target is None or Path(target).suffix != ".xml":
@@ -249,18 +249,6 @@ def _calibration(source: object) -> "Calibration | None":
     """Return the calibration that is to be converted; None for a recording."""
     from gfimu.calibration.result import Calibration, load_calibration
 
-    if isinstance(source, list | tuple) and len(source) == 1:
-        source = source[0]
     if isinstance(source, str | Path):
         return load_calibration(source) if Path(source).suffix == ".json" else None
     return source if isinstance(source, Calibration) else None
-
-
-def _given(
-    source: "RecordingLike | Calibration | AccelerometerArray | Sequence[str | Path]",
-) -> "list[RecordingLike]":
-    """Return one source or several as a list."""
-    from gfimu.commands.opened import is_arrays
-
-    several = isinstance(source, list | tuple) and not is_arrays(source)
-    return list(source) if several else [source]  # type: ignore[arg-type, list-item]

@@ -12,70 +12,48 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from gfimu.base.errors import InputError
-from gfimu.commands.shell import completion
+from gfimu.commands import given
+from gfimu.commands.shell import completion, options
 from gfimu.commands.shell.declare import Option, command
-from gfimu.commands.shell.options import ALLOW_CODE, DURATION, MAP, MAX_MEMORY, PROGRESS, SEED, TWIN
 from gfimu.commands.shell.output_files import SCENARIO
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
-    from gfimu.base.files.memory import MemorySize
     from gfimu.diagnosis.design.proposal import Proposal
-    from gfimu.model.world_model import Effect, WorldModel
-    from gfimu.recording.importing import ColumnMap
-    from gfimu.recording.mapped import RecordingLike
+    from gfimu.model.world_model import Effect
 
 __all__ = ["design"]
 
+_EFFECTS = Option(
+    "Effects to distinguish; or use --verdict.", "[EFFECT]...", kind=list[str], argument=True, offers=completion.effects
+)
+_VERDICT = Option("Take the effects of an ambiguous verdict (verdict.json).", "FILE", reads=True)
+_RUN = "Recording at hand, to be diagnosed together with the new one; may be repeated."
+_ACCELERATION = Option("Largest angular acceleration of the table, rad/s².", "RAD/S²")
 
-def _results() -> tuple[type, ...]:
-    from gfimu.diagnosis.design.proposal import Proposal
 
-    return (Proposal,)
-
-
-@command(results=_results, doing="designing")
+@command(doing="designing")
 def design(
-    twin: Annotated["WorldModel | str | Path", TWIN],
-    effects: Annotated[
-        "Sequence[str | Effect]",
-        Option(
-            "Effects to distinguish; or use --verdict.",
-            "[EFFECT]...",
-            kind=list[str],
-            argument=True,
-            offers=completion.effects,
-        ),
-    ] = (),
+    twin: given.Twin,
+    effects: Annotated["Sequence[str | Effect]", _EFFECTS] = (),
     *,
-    verdict: Annotated[
-        "str | Path | None",
-        Option("Take the effects of an ambiguous verdict (verdict.json).", "FILE", kind=Path, reads=True),
-    ] = None,
-    run: Annotated[
-        "RecordingLike | Sequence[RecordingLike]",
-        Option(
-            "Recording at hand, to be diagnosed together with the new one; may be repeated.",
-            "RUN",
-            kind=list[Path],
-            reads=True,
-        ),
-    ] = (),
-    allow_code: Annotated[bool, ALLOW_CODE] = False,
-    column_map: Annotated["ColumnMap | str | Path | None", MAP] = None,
-    max_memory: Annotated["MemorySize | None", MAX_MEMORY] = None,
+    verdict: Annotated["str | Path | None", _VERDICT] = None,
+    run: Annotated[given.Runs, Option(_RUN, "RUN", kind=list[Path], reads=True)] = (),
+    allow_code: Annotated[bool, options.ALLOW_CODE] = False,
+    column_map: given.Map = None,
+    max_memory: given.Memory = None,
     max_rate: Annotated[float, Option("Largest rate of the table, rad/s.", "RAD/S")] = 15.0,
-    max_acceleration: Annotated[float, Option("Largest angular acceleration of the table, rad/s².", "RAD/S²")] = 20.0,
-    duration: Annotated[float, DURATION] = 60.0,
+    max_acceleration: Annotated[float, _ACCELERATION] = 20.0,
+    duration: Annotated[float, options.DURATION] = 60.0,
     upright: Annotated[bool, Option("Never propose to mount the array differently.")] = False,
     evaluations: Annotated[int, Option("How many profiles to try.", "N", least=1)] = 150,
-    seed: Annotated[int, SEED] = 0,
+    seed: Annotated[int, options.SEED] = 0,
     out: Annotated[
         "str | Path | None",
-        Option("Scenario to write (.toml): the experiment.", "FILE", kind=Path, writes=SCENARIO, what="scenario"),
+        Option("Scenario to write (.toml): the experiment.", "FILE", writes=SCENARIO, what="scenario"),
     ] = None,
-    progress: Annotated["Callable[[float, str], None] | None", PROGRESS] = None,
+    progress: given.Progress = None,
 ) -> "Proposal":
     """Propose the table profile, or the mounting, that best separates effects.
 
@@ -98,23 +76,17 @@ def design(
     from gfimu.diagnosis.design.ambiguity import open_effects
     from gfimu.diagnosis.design.design import MOUNTINGS, Limits
     from gfimu.diagnosis.design.design import design as propose
-    from gfimu.recording import Recording
     from gfimu.recording.formats import open_recording
 
     if (verdict is None) == (not effects):
         raise InputError("name effects to distinguish, or give --verdict: one of the two")
     model = as_twin(twin, allow_code=allow_code)
     asked = list(effects) if verdict is None else open_effects(verdict, model)
-    at_hand = [
-        prepare_run(
-            item if isinstance(item, Recording) else open_recording(item, array=model.array),
-            model,
-            name=str(item) if isinstance(item, str | os.PathLike) else f"run {number}",
-        )
-        for number, item in enumerate(
-            (as_source(one, model.array, column_map, max_memory=max_memory) for one in as_runs(run)), start=1
-        )
-    ]
+    at_hand = []
+    for number, recording in enumerate(as_runs(run), start=1):
+        source = as_source(recording, model.array, column_map, max_memory=max_memory)
+        name = str(source) if isinstance(source, str | os.PathLike) else f"run {number}"
+        at_hand.append(prepare_run(open_recording(source, array=model.array), model, name=name))
     proposal = propose(
         model,
         asked,

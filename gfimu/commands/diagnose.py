@@ -17,10 +17,11 @@ gfimu diagnose accel.csv --map mine.toml --reference tacho.csv --twin rig.toml -
 gfimu diagnose run.parquet --twin cube12_turntable --calibration cal.json --out diagnosis
 """
 
+import itertools
 import os
 import time
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -28,34 +29,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 from gfimu.base.errors import InputError
 from gfimu.base.files.outputs import OutputFolder, check_outputs, same_file
 from gfimu.base.optional_packages import missing
+from gfimu.commands import given
+from gfimu.commands.shell import options
 from gfimu.commands.shell.declare import Option, command, command_of
-from gfimu.commands.shell.options import (
-    ALLOW_CODE,
-    CALIBRATION,
-    FORCE,
-    MAP,
-    MAX_MEMORY,
-    PROGRESS,
-    RECORDINGS,
-    REFERENCE_MAP,
-    TIME_LIMIT,
-    TWIN,
-)
 
 if TYPE_CHECKING:
-    from gfimu.base.files.memory import MemorySize
-    from gfimu.calibration.result import Calibration
-    from gfimu.commands.opened import Source
     from gfimu.diagnosis.report.rig import DrawnRig
     from gfimu.diagnosis.verdict.verdict import Diagnosis
     from gfimu.model.world_model import WorldModel
     from gfimu.recording import Recording
-    from gfimu.recording.importing import ColumnMap
     from gfimu.recording.joining import Joined, ReferenceSeries
-    from gfimu.recording.mapped import RecordingLike
-    from gfimu.visual.scene import Shape
-    from sim.twin import Twin
-    from sim.world import World
 
 __all__ = ["FOLDER", "diagnose", "write_report"]
 
@@ -81,7 +64,7 @@ class _Report:
     """What the shell prints: what the recordings show, and the diagnosis."""
 
     found: "Diagnosis"
-    given: Mapping[str, Any]
+    values: Mapping[str, Any]
 
     def to_dict(self) -> dict[str, Any]:
         """Return the diagnosis as JSON holds it."""
@@ -106,7 +89,7 @@ class _Report:
         with progress("looking at the recordings"), warnings.catch_warnings():
             warnings.simplefilter("ignore")
             try:
-                return list(check(**looked_at.taken(self.given)).in_short())
+                return list(check(**looked_at.taken(self.values)).in_short())
             except InputError:
                 return []
 
@@ -124,21 +107,28 @@ class _Report:
 
 
 def _run(
-    given: dict[str, Any],
+    values: dict[str, Any],
     as_json: bool,
     *,
     check: Annotated[bool, Option("Only look at the recordings, as `gfimu check`: no diagnosis, no --out.")] = False,
 ) -> None:
+    from gfimu.commands.check import check as look
     from gfimu.commands.shell.printing import print_report
 
-    declared = command_of(diagnose)
-    if check:
-        from gfimu.commands.check import check as look
-
-        declared = command_of(look)
-    elif given["out"] is None:
+    if not check and values["out"] is None:
         raise InputError("--out is missing: the folder for the diagnosis; --check needs none")
-    print_report(declared, declared.taken(given), as_json=as_json)
+    declared = command_of(look if check else diagnose)
+    print_report(declared, declared.taken(values), as_json=as_json)
+
+
+_OUT = Option(
+    "Folder to write: verdict.json, twin.toml with its array, report.html, diagnosis.rrd.", "FILE", writes=FOLDER
+)
+_HELD_OUT = Option("Recording kept for measuring the gain; may be repeated.", "RUN", kind=list[Path], reads=True)
+_GRAMMAR = Option("Search the wider library of effects at once, not only where the usual one fails.")
+_LIMIT = options.TIME_LIMIT.also(". What is known by then is the result, and described so")
+_REFERENCE = Option("Reference of the first run on a clock of its own; aligned as by `gfimu join`.", "FILE", reads=True)
+_NAMES = Option("Names of the runs, for people; those of their files by default.", shell=False)
 
 
 @command(
@@ -146,51 +136,26 @@ def _run(
     doing="diagnosing",
     report=_Report,
     run=_run,
-    files=lambda found, given: _written_files(found, given["out"]),
+    files=lambda found, values: _written_files(found, values["out"]),
     exit_code=_Report.exit_code,
 )
 def diagnose(
-    recordings: Annotated["RecordingLike | Sequence[RecordingLike]", RECORDINGS.also("; fitted together")],
-    twin: Annotated["WorldModel | str | Path", TWIN],
+    recordings: Annotated[given.Runs, options.RECORDINGS.also("; fitted together")],
+    twin: given.Twin,
     *,
-    out: Annotated[
-        "str | Path | None",
-        Option(
-            "Folder to write: verdict.json, twin.toml with its array, report.html, diagnosis.rrd.",
-            "FILE",
-            kind=Path,
-            writes=FOLDER,
-        ),
-    ] = None,
-    held_out: Annotated[
-        "RecordingLike | Sequence[RecordingLike]",
-        Option("Recording kept for measuring the gain; may be repeated.", "RUN", kind=list[Path], reads=True),
-    ] = (),
-    calibration: Annotated["Calibration | str | Path | None", CALIBRATION] = None,
-    grammar: Annotated[
-        bool, Option("Search the wider library of effects at once, not only where the usual one fails.")
-    ] = False,
-    force: Annotated[bool, FORCE] = False,
-    allow_code: Annotated[bool, ALLOW_CODE] = False,
-    time_limit: Annotated[
-        float, TIME_LIMIT.also(". What is known by then is the result, and described so")
-    ] = _TIME_LIMIT_S,
-    column_map: Annotated["ColumnMap | str | Path | None", MAP] = None,
-    max_memory: Annotated["MemorySize | None", MAX_MEMORY] = None,
-    reference: Annotated[
-        "ReferenceSeries | str | Path | None",
-        Option(
-            "Reference of the first run on a clock of its own; aligned as by `gfimu join`.",
-            "FILE",
-            kind=Path,
-            reads=True,
-        ),
-    ] = None,
-    reference_map: Annotated["ColumnMap | str | Path | None", REFERENCE_MAP] = None,
-    names: Annotated[
-        "Sequence[str] | None", Option("Names of the runs, for people; those of their files by default.", shell=False)
-    ] = None,
-    progress: Annotated["Callable[[float, str], None] | None", PROGRESS] = None,
+    out: Annotated["str | Path | None", _OUT] = None,
+    held_out: Annotated[given.Runs, _HELD_OUT] = (),
+    calibration: given.CalibrationToApply = None,
+    grammar: Annotated[bool, _GRAMMAR] = False,
+    force: Annotated[bool, options.FORCE] = False,
+    allow_code: Annotated[bool, options.ALLOW_CODE] = False,
+    time_limit: Annotated[float, _LIMIT] = _TIME_LIMIT_S,
+    column_map: given.Map = None,
+    max_memory: given.Memory = None,
+    reference: Annotated["ReferenceSeries | str | Path | None", _REFERENCE] = None,
+    reference_map: given.ReferenceMap = None,
+    names: Annotated["Sequence[str] | None", _NAMES] = None,
+    progress: given.Progress = None,
 ) -> "Diagnosis":
     """Compare recordings with a simulation: name the causes of the difference, extend the simulation, measure the gain.
 
@@ -219,7 +184,7 @@ def diagnose(
     >>> found.verdict, found.gain.share_of_excess_removed  # doctest: +SKIP
     >>> found.plot()  # doctest: +SKIP
     """
-    from gfimu.commands.opened import as_calibration, as_runs, as_source, as_twin
+    from gfimu.commands.opened import as_calibrated_run, as_calibration, as_runs, as_source, as_twin, names_of
     from gfimu.diagnosis.time_limit import limited_to
     from gfimu.recording.checks import examine
     from gfimu.recording.joining import displaced_reference
@@ -231,28 +196,30 @@ def diagnose(
         from gfimu.diagnosis.report.folder import warn_of_omitted
 
         warn_of_omitted()
-    given = as_twin(twin, allow_code=allow_code)
+    asked = as_twin(twin, allow_code=allow_code)
     runs, unseen = (
-        [as_source(run, given.array, column_map, max_memory=max_memory) for run in as_runs(group)]
+        [as_source(run, asked.array, column_map, max_memory=max_memory) for run in as_runs(group)]
         for group in (recordings, held_out)
     )
     _refuse_fitted(runs, unseen)
-    model = given.searching(wide=True) if grammar else given
+    model = asked.searching(wide=True) if grammar else asked
     unit = None if calibration is None else as_calibration(calibration)
-    read, kept = ([_opened(run, model, unit) for run in group] for group in (runs, unseen))
+    read, kept = ([as_calibrated_run(run, model.array, unit)[0] for run in group] for group in (runs, unseen))
     if unit is not None and unit.positions:
         model = model.with_array(unit.calibrated_array(model.array))
-    labels = _names(runs) if names is None else names
-    for one, name in zip((*read, *kept), (*labels, *_names(unseen)), strict=True):
-        examine(one, model.array, source=name, force=force, apart_from=EXPLAINED, whose="")
+    labels = names_of(runs) if names is None else names
+    for run, name in zip((*read, *kept), (*labels, *names_of(unseen)), strict=True):
+        examine(run, model.array, source=name, force=force, apart_from=EXPLAINED, whose="")
     free = model.drive_source == "gyro"
-    clocks = [displaced_reference(one, rates=free) if not free or _by_tacho(one) else None for one in read]
+    clocks = [displaced_reference(run, rates=free) if not free or _by_tacho(run) else None for run in read]
     if reference is not None:
         from gfimu.commands.join import join
 
         clocks[0] = join(read[0], reference, reference_map=reference_map, max_memory=max_memory)
     with limited_to(time_limit - (time.monotonic() - began)):
-        found, used = _explained(read, clocks, model, reference is not None, kept, labels, progress, force)
+        aligned = list(zip(read, clocks, strict=True))
+        search = {"held_out": kept, "names": labels, "report": progress, "force": force}
+        found, used = _explained(aligned, model, two_files=reference is not None, **search)
     if used.mounting_rotvec.any():
         x, y, z = used.mounting_rotvec.tolist()
         found = replace(found, mounting_rotvec_rad=(x, y, z))
@@ -264,44 +231,38 @@ def diagnose(
 
 
 def _explained(
-    read: "Sequence[Recording]",
-    clocks: "Sequence[Joined | None]",
-    model: "WorldModel",
-    two_files: bool,
-    kept: "Sequence[Recording]",
-    labels: Sequence[str],
-    progress: Callable[[float, str], None] | None,
-    force: bool,
+    aligned: "Sequence[tuple[Recording, Joined | None]]", model: "WorldModel", *, two_files: bool, **search: Any
 ) -> "tuple[Diagnosis, Recording]":
     """Return the diagnosis of recordings whose references are aligned where they had another clock, and the first run.
 
     The rate error of a clock is left in, so that it is diagnosed beside all else. Where the alignment shows one and the
     diagnosis doesn't name it, or the model is of a free body, which has no such effect, it is taken off.
     """
-    from gfimu.diagnosis.diagnose import diagnose as explain
+    from gfimu.diagnosis.diagnose import diagnose as diagnosed
     from gfimu.diagnosis.verdict.parts import ReferenceClock
     from gfimu.diagnosis.verdict.sample_notes import with_reference_clock
 
-    def runs(own_rate: bool) -> "list[Recording]":
-        return [
-            run if one is None else (one.by_own_rate if own_rate else one.by_reference_clock)
-            for run, one in zip(read, clocks, strict=True)
+    def explain(*, own_rate: bool) -> "tuple[Diagnosis, Recording]":
+        runs = [
+            run if clock is None else (clock.by_own_rate if own_rate else clock.by_reference_clock)
+            for run, clock in aligned
         ]
+        return diagnosed(runs, model, **search), runs[0]
 
-    first = next((one for one in clocks if one is not None), None)
-    used = runs(model.drive_source != "gyro")
-    found = explain(used, model, held_out=kept, names=labels, report=progress, force=force)
+    first = next((clock for _, clock in aligned if clock is not None), None)
+    free = model.drive_source == "gyro"
+    found, used = explain(own_rate=not free)
     if first is None or found.interrupted:
-        return found, used[0]
+        return found, used
     corrected = ["tacho_latency"] if first.is_far and not two_files else []
     if first.has_rate_error and "clock_error" not in {cause.effect for cause in found.causes}:
         corrected.append("clock_error")
-        if model.drive_source != "gyro":
-            again = explain(runs(False), model, held_out=kept, names=labels, report=progress, force=force)
+        if not free:
+            again, run = explain(own_rate=False)
             if again.interrupted:  # what is known is the verdict with the clock's error left in
-                return replace(found, interrupted=again.interrupted), used[0]
-            used, found = runs(False), again
-    return with_reference_clock(found, ReferenceClock(**first.clock), corrected, model), used[0]
+                return replace(found, interrupted=again.interrupted), used
+            found, used = again, run
+    return with_reference_clock(found, ReferenceClock(**first.clock), corrected, model), used
 
 
 def write_report(diagnosis: "Diagnosis", folder: str | Path) -> Path:
@@ -334,8 +295,7 @@ def write_report(diagnosis: "Diagnosis", folder: str | Path) -> Path:
     from gfimu.diagnosis.report.folder import write_diagnosis
 
     check_outputs([("folder", folder, FOLDER)])
-    text, more = _twin_files(diagnosis)
-    written = write_diagnosis(folder, diagnosis, twin_toml=text, more=more, rig=drawn_rig(diagnosis))
+    written = write_diagnosis(folder, diagnosis, more=_twin_files(diagnosis), rig=drawn_rig(diagnosis))
     return written.get("report", written["verdict"])
 
 
@@ -343,26 +303,21 @@ def _written_files(diagnosis: "Diagnosis", folder: str | Path) -> dict[str, Path
     """Return the files that `write_report` writes to a folder, by what they are called."""
     from gfimu.diagnosis.report.folder import files_of
 
-    names = files_of(diagnosis, _twin_files(diagnosis)[1])
+    names = files_of(diagnosis, _twin_files(diagnosis))
     return {meaning: Path(folder) / name for name, meaning in names.items()}
 
 
-def _twin_files(diagnosis: "Diagnosis") -> tuple[str, dict[str, str]]:
-    """Return the text of the extended twin's file, and the texts of files that it names, by file name."""
+def _twin_files(diagnosis: "Diagnosis") -> dict[str, str]:
+    """Return the texts of array file and twin file where the array is no shipped one, and moves with the twin."""
     import tomli_w
 
     from gfimu.base.files.model_files import list_models
     from sim.twin import Twin
 
     twin = diagnosis.twin
-    if not isinstance(twin, Twin):
-        return twin.to_toml(), {}
-    content, more = twin.to_dict(), {}
-    if twin.array_name not in list_models("arrays"):
-        # An array file of the user's, and a calibrated one, is named relative to the twin file: it moves with it.
-        content["array"] = "array.toml"
-        more["array.toml"] = twin.array.to_toml()
-    return tomli_w.dumps(content), more
+    if not isinstance(twin, Twin) or twin.array_name in list_models("arrays"):
+        return {}
+    return {"twin.toml": tomli_w.dumps({**twin.to_dict(), "array": "array.toml"}), "array.toml": twin.array.to_toml()}
 
 
 def drawn_rig(diagnosis: "Diagnosis") -> "DrawnRig | None":
@@ -376,54 +331,23 @@ def drawn_rig(diagnosis: "Diagnosis") -> "DrawnRig | None":
     if not isinstance(twin, Twin):
         return None
     world = twin.world(mounting=np.array(diagnosis.mounting_rotvec_rad))
-    lean = None if world.leaning_axis() is None else world.axis_rotvec
-    return DrawnRig(world.mount_rotvec, world.cube_offset, _shapes(twin, world), world.slide, lean)
+    leans, shapes = world.leaning_axis() is not None, None
+    if not leans and world.slide is None and twin.drive_source != "gyro" and not missing("mujoco", "rerun"):
+        from sim.drawing import rig_drawing
 
-
-def _shapes(twin: "Twin", world: "World") -> "Mapping[str, Sequence[Shape]] | None":
-    """Return the shapes of the rig; None where it has none of its own, or is not drawn here."""
-    on_table = world.slide is None and world.leaning_axis() is None
-    if twin.drive_source == "gyro" or not on_table or missing("mujoco", "rerun"):
-        return None
-    from sim.drawing import rig_drawing
-
-    return rig_drawing(world)
+        shapes = rig_drawing(world)
+    return DrawnRig(world.mount_rotvec, world.cube_offset, shapes, world.slide, world.axis_rotvec if leans else None)
 
 
 def _refuse_fitted(fitted: Sequence[object], held_out: Sequence[object]) -> None:
     """Refuse a run that is fitted and held out both: the gain would be measured on what was fitted."""
-    for one in held_out:
-        for other in fitted:
-            same = one is other
-            if not same and isinstance(one, str | os.PathLike) and isinstance(other, str | os.PathLike):
-                same = same_file(Path(one), Path(other))
-            if same:
-                name = one if isinstance(one, str | os.PathLike) else "a recording"
-                raise InputError(f"{name}: is fitted and held out; hold out a recording that is not fitted")
+    for kept, other in itertools.product(held_out, fitted):
+        paths = [Path(run) for run in (kept, other) if isinstance(run, str | os.PathLike)]
+        if kept is other or (len(paths) == 2 and same_file(*paths)):
+            name = kept if paths else "a recording"
+            raise InputError(f"{name}: is fitted and held out; hold out a recording that is not fitted")
 
 
 def _by_tacho(recording: "Recording") -> bool:
     """Return whether a free body's rate is that of a tachometer along its axle, and not of a gyro on the body."""
     return "tacho_rad_s" in recording.reference and "gyro_x_rad_s" not in recording.reference
-
-
-def _opened(recording: "Source", model: "WorldModel", unit: "Calibration | None") -> "Recording":
-    """Return a recording with the channels of the twin's array, calibrated where there is a calibration."""
-    from gfimu.calibration.run_file import open_calibrated_run
-    from gfimu.recording import Recording
-    from gfimu.recording.formats import open_recording
-
-    if isinstance(recording, Recording):
-        return recording if unit is None else unit.apply(recording)
-    if unit is None:
-        return open_recording(recording, array=model.array)
-    return open_calibrated_run(recording, unit, model.array)[0]
-
-
-def _names(runs: "Sequence[Source]") -> list[str]:
-    """Return names for people: file names where they distinguish the runs."""
-    paths = [Path(run) if isinstance(run, str | os.PathLike) else None for run in runs]
-    short = [path.name if path is not None else f"run {number}" for number, path in enumerate(paths, start=1)]
-    if len(set(short)) == len(short):
-        return short
-    return [str(path) if path is not None else name for path, name in zip(paths, short, strict=True)]

@@ -13,84 +13,57 @@ gfimu drift --array one_chip --axis z --speed-rad-s 6 --duration 60 --bias-mg 5 
 
 import math
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from gfimu.base.errors import InputError
+from gfimu.commands import given
 from gfimu.commands.known_axis import AXIS_ALONE, AxisLike, KnownAxis, as_known_axis
 from gfimu.commands.opened import as_array
-from gfimu.commands.shell.declare import Command, Option, command
-from gfimu.commands.shell.options import (
-    ARRAY,
-    BIAS_MG,
-    CALIBRATION,
-    DURATION,
-    FORCE,
-    GRAVITY,
-    LATITUDE,
-    MAP,
-    MAX_MEMORY,
-    NOISE_UG,
-    PICTURE,
-    PROGRESS,
-    SEED,
-    SPEED_RAD_S,
-)
+from gfimu.commands.shell import options
+from gfimu.commands.shell.declare import Command, Option, command, command_of
 
 if TYPE_CHECKING:
-    from gfimu.array.array import AccelerometerArray
-    from gfimu.base.files.memory import MemorySize
     from gfimu.budget.drift import ErrorSources
     from gfimu.budget.drift.equivalent import EquivalentErrors
     from gfimu.budget.drift.rest_windows import RestDrift
     from gfimu.budget.drift.result import Drift
-    from gfimu.calibration.result import Calibration
     from gfimu.rate.axis.accuracy.drift import AxisDrift
-    from gfimu.recording.importing import ColumnMap
-    from gfimu.recording.mapped import RecordingLike
 
 __all__ = ["axis_drift", "drift", "drift_from_position", "drift_of_rest"]
 
 _USUAL = "cube12"
-_ARRAY = ARRAY.also(f"; else the recording's own, or {_USUAL} without a recording")
-_TIME = DURATION.also(", from the start of navigation")
+_ARRAY = options.ARRAY.also(f"; else the recording's own, or {_USUAL} without a recording")
+_TIME = options.DURATION.also(", from the start of navigation")
 _WALK = Option("Random walk of each channel's bias, µg/√s.")
-_SPEED = SPEED_RAD_S.also(", of the table about the vertical or the known axis; 0 is at rest")
+_SPEED = options.SPEED_RAD_S.also(", of the table about the vertical or the known axis; 0 is at rest")
+_LEAD = Option("With RUN: rest before each window, from which tilt and biases are read off, s.")
+_POSITION = Option("Measured position error x y z after --duration, m, z up: which bias or drift would explain it?")
+_KNOWN_BIAS = Option("With --from-position: known bias of p, x y z, mg; its share is taken off first.")
+_LATITUDE = options.LATITUDE.also(", for the Earth's share", when="With --from-position: ")
+_HUB_NOISE = Option("Of a free hub: density of its own force, m/s²/√Hz.")
+_RATE_DRIFT = Option("Constant error of the angular rate per axis, °/h.")
+_OFFSET = Option("Horizontal place of the unit off the axis, x y, m.")
 _OF_RECORDINGS = {"lead", "calibration", "picture", "column_map", "force"}
 _OF_POSITIONS = {"known_bias_mg", "latitude"}
 _OF_FREE_BODIES = {"rate_drift_deg_h", "offset", "monte_carlo"}
 
 
-def _rest_results() -> tuple[type, ...]:
-    from gfimu.budget.drift.rest_windows import RestDrift
-
-    return (RestDrift,)
-
-
-@command(results=_rest_results, doing="navigating through the rests")
+@command(doing="navigating through the rests")
 def drift_of_rest(
     recording: Annotated[
-        "RecordingLike",
-        Option(
-            "Recording with long rests: the drift that it has, beside what its noise predicts.",
-            "[RUN]",
-            kind=Path,
-            argument=True,
-            reads=True,
-        ),
+        given.Run,
+        given.RUN.also(" with long rests: the drift that it has, beside what its noise predicts.", metavar="[RUN]"),
     ],
-    array: Annotated["AccelerometerArray | str | Path | None", _ARRAY] = None,
+    array: Annotated[given.Array, _ARRAY] = None,
     *,
     duration: Annotated[float, _TIME] = 30.0,
-    lead: Annotated[
-        float, Option("With RUN: rest before each window, from which tilt and biases are read off, s.")
-    ] = 10.0,
-    gravity: Annotated[float, GRAVITY] = 9.80665,
-    calibration: Annotated["Calibration | str | Path | None", CALIBRATION.also(when="With RUN: ")] = None,
-    picture: Annotated[str | Path | None, PICTURE.also(when="With RUN: ")] = None,
-    column_map: Annotated["ColumnMap | str | Path | None", MAP] = None,
-    max_memory: Annotated["MemorySize | None", MAX_MEMORY] = None,
-    force: Annotated[bool, FORCE] = False,
+    lead: Annotated[float, _LEAD] = 10.0,
+    gravity: Annotated[float, options.GRAVITY] = 9.80665,
+    calibration: Annotated[given.CalibrationToApply, options.CALIBRATION.also(when="With RUN: ")] = None,
+    picture: Annotated[given.Picture, options.PICTURE.also(when="With RUN: ")] = None,
+    column_map: given.Map = None,
+    max_memory: given.Memory = None,
+    force: Annotated[bool, options.FORCE] = False,
 ) -> "RestDrift":
     """Navigate through the rests of a recording, and compare the errors with the prediction from its noise.
 
@@ -124,26 +97,14 @@ def drift_of_rest(
     return windows
 
 
-def _position_results() -> tuple[type, ...]:
-    from gfimu.budget.drift.equivalent import EquivalentErrors
-
-    return (EquivalentErrors,)
-
-
-@command(results=_position_results)
+@command()
 def drift_from_position(
-    from_position: Annotated[
-        tuple[float, float, float],
-        Option("Measured position error x y z after --duration, m, z up: which bias or drift would explain it?"),
-    ],
+    from_position: Annotated[tuple[float, float, float], _POSITION],
     *,
     duration: Annotated[float, _TIME] = 30.0,
-    known_bias_mg: Annotated[
-        tuple[float, float, float],
-        Option("With --from-position: known bias of p, x y z, mg; its share is taken off first."),
-    ] = (0.0, 0.0, 0.0),
-    latitude: Annotated[float | None, LATITUDE.also(", for the Earth's share", when="With --from-position: ")] = None,
-    gravity: Annotated[float, GRAVITY] = 9.80665,
+    known_bias_mg: Annotated[tuple[float, float, float], _KNOWN_BIAS] = (0.0, 0.0, 0.0),
+    latitude: Annotated[float | None, _LATITUDE] = None,
+    gravity: Annotated[float, options.GRAVITY] = 9.80665,
 ) -> "EquivalentErrors":
     """Compute the bias of p and the error of the rate that would explain a measured position error of a unit at rest.
 
@@ -164,23 +125,17 @@ def drift_from_position(
     return equivalent_errors(from_position, duration, known_bias_mg=known_bias_mg, latitude=latitude, gravity=gravity)
 
 
-def _axis_results() -> tuple[type, ...]:
-    from gfimu.rate.axis.accuracy.drift import AxisDrift
-
-    return (AxisDrift,)
-
-
-@command(results=_axis_results)
+@command()
 def axis_drift(
-    array: Annotated["AccelerometerArray | str | Path | None", _ARRAY] = None,
+    array: Annotated[given.Array, _ARRAY] = None,
     *,
     axis: Annotated[AxisLike, AXIS_ALONE] = None,
     duration: Annotated[float, _TIME] = 30.0,
-    bias_mg: Annotated[float, BIAS_MG] = 0.0,
-    noise_ug: Annotated[float, NOISE_UG] = 0.0,
+    bias_mg: Annotated[float, options.BIAS_MG] = 0.0,
+    noise_ug: Annotated[float, options.NOISE_UG] = 0.0,
     walk_ug: Annotated[float, _WALK] = 0.0,
     speed_rad_s: Annotated[float, _SPEED] = 0.0,
-    hub_noise_m_s2_rthz: Annotated[float, Option("Of a free hub: density of its own force, m/s²/√Hz.")] = 0.1,
+    hub_noise_m_s2_rthz: Annotated[float, _HUB_NOISE] = 0.1,
 ) -> "AxisDrift":
     """Budget the drift of rate and angle about a known axis, for as few as one chip.
 
@@ -215,38 +170,31 @@ def axis_drift(
     )
 
 
-def _results() -> tuple[type, ...]:
-    from gfimu.budget.drift.result import Drift
-
-    return (Drift,)
-
-
-def _run(given: Mapping[str, Any], as_json: bool) -> None:
+def _run(values: Mapping[str, Any], as_json: bool) -> None:
     """Call the function that the options are of, and print what it gives."""
     from gfimu.commands.shell.printing import print_report
 
-    declared = _meant(given, *(function.__command__ for function in _FUNCTIONS))
-    own = {name: given[name] for name in declared.parameters if given.get(name) is not None}
+    declared = _meant(values)
+    own = {name: values[name] for name in declared.parameters if values.get(name) is not None}
     print_report(declared, own, as_json=as_json)
 
 
-def _meant(
-    given: Mapping[str, Any], of_body: Command, of_rest: Command, of_position: Command, of_axis: Command
-) -> Command:
+def _meant(values: Mapping[str, Any]) -> Command:
     """Return what the options are of; raises `InputError` for one that is of something else."""
-    functions = (of_body, of_rest, of_position, of_axis)
+    functions = tuple(command_of(function) for function in (drift, drift_of_rest, drift_from_position, axis_drift))
+    of_body, of_rest, of_position, of_axis = functions
     usual = {name: parameter.default for one in functions for name, parameter in one.parameters.items()}
-    used = {name for name, default in usual.items() if given.get(name) not in (default, None, KnownAxis())}
-    if given["recording"] is not None:
+    used = {name for name, default in usual.items() if values.get(name) not in (default, None, KnownAxis())}
+    if values["recording"] is not None:
         if used - of_rest.parameters.keys():
             raise InputError(
-                f"{given['recording']}: the drift of a recording goes with --array, --calibration, --duration, --lead, "
-                "--gravity, --picture, --map and --force; its noise is measured"
+                f"{values['recording']}: the drift of a recording goes with --array, --calibration, --duration, "
+                "--lead, --gravity, --picture, --map and --force; its noise is measured"
             )
         return of_rest
     if used & _OF_RECORDINGS:
         raise InputError("--lead, --calibration, --picture, --map and --force are of a recording; name it first")
-    if given["from_position"] is not None:
+    if values["from_position"] is not None:
         if used - of_position.parameters.keys():
             raise InputError(
                 "--from-position works errors out; give it with --duration, --known-bias-mg, --latitude, --gravity"
@@ -254,28 +202,28 @@ def _meant(
         return of_position
     if used & _OF_POSITIONS:
         raise InputError("--known-bias-mg and --latitude go with --from-position")
-    if given["axis"].of(as_array(given["array"] or _USUAL)) is None:
+    if values["axis"].of(as_array(values["array"] or _USUAL)) is None:
         return of_body
     if used & _OF_FREE_BODIES:
         raise InputError("--rate-drift-deg-h, --offset and --monte-carlo have no use with a known axis (--axis)")
     return of_axis
 
 
-@command(results=_results, doing="Monte Carlo", run=_run, parts=(drift_of_rest, drift_from_position, axis_drift))
+@command(doing="Monte Carlo", run=_run, parts=(drift_of_rest, drift_from_position, axis_drift))
 def drift(
-    array: Annotated["AccelerometerArray | str | Path | None", _ARRAY] = None,
+    array: Annotated[given.Array, _ARRAY] = None,
     *,
     duration: Annotated[float, _TIME] = 30.0,
-    bias_mg: Annotated[float, BIAS_MG] = 0.0,
-    noise_ug: Annotated[float, NOISE_UG] = 0.0,
+    bias_mg: Annotated[float, options.BIAS_MG] = 0.0,
+    noise_ug: Annotated[float, options.NOISE_UG] = 0.0,
     walk_ug: Annotated[float, _WALK] = 0.0,
-    rate_drift_deg_h: Annotated[float, Option("Constant error of the angular rate per axis, °/h.")] = 0.0,
+    rate_drift_deg_h: Annotated[float, _RATE_DRIFT] = 0.0,
     speed_rad_s: Annotated[float, _SPEED] = 0.0,
-    offset: Annotated[tuple[float, float], Option("Horizontal place of the unit off the axis, x y, m.")] = (0.0, 0.0),
-    gravity: Annotated[float, GRAVITY] = 9.80665,
+    offset: Annotated[tuple[float, float], _OFFSET] = (0.0, 0.0),
+    gravity: Annotated[float, options.GRAVITY] = 9.80665,
     monte_carlo: Annotated[int, Option("Number of nonlinear Monte Carlo runs; 0 for none.")] = 0,
-    seed: Annotated[int, SEED] = 0,
-    progress: Annotated[Callable[[float], None] | None, PROGRESS] = None,
+    seed: Annotated[int, options.SEED] = 0,
+    progress: Annotated[Callable[[float], None] | None, options.PROGRESS] = None,
 ) -> "Drift":
     """Budget the position drift of an array; about a known axis see `axis_drift`.
 
@@ -310,9 +258,6 @@ def drift(
         rng = np.random.default_rng(seed)
         sample = monte_carlo_drift(geometry, duration, sources, runs=monte_carlo, rng=rng, progress=progress, **motion)
     return Drift(budget, sample, seed)
-
-
-_FUNCTIONS: tuple[Any, ...] = (drift, drift_of_rest, drift_from_position, axis_drift)
 
 
 def _sources(bias_mg: float, noise_ug: float, walk_ug: float, rate_drift_deg_h: float = 0.0) -> "ErrorSources":

@@ -17,22 +17,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from gfimu.base.errors import GeometryError, InputError, naming
+from gfimu.base.errors import InputError, naming
+from gfimu.commands import given
 from gfimu.commands.known_axis import AXIS, AxisLike, as_known_axis
 from gfimu.commands.place import PLACE, Place
+from gfimu.commands.shell import options
 from gfimu.commands.shell.completion import words
 from gfimu.commands.shell.declare import Option, command
-from gfimu.commands.shell.options import (
-    ARRAY,
-    CALIBRATION,
-    FORCE,
-    GYRO,
-    KEEP_FAULTY,
-    MAP,
-    MAX_MEMORY,
-    RRD,
-    UNKNOWN_START,
-)
 from gfimu.commands.shell.output_files import ESTIMATE
 from gfimu.rate.registry import RATE_METHODS, rate_method
 
@@ -40,18 +31,28 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from gfimu.array.array import AccelerometerArray
-    from gfimu.array.turning_axis import TurningAxis
-    from gfimu.base.files.memory import MemorySize
-    from gfimu.calibration.result import Calibration
     from gfimu.motion.estimate import Estimate
     from gfimu.motion.estimate_summary import EstimateSummary
     from gfimu.recording import Recording
-    from gfimu.recording.importing import ColumnMap
-    from gfimu.recording.mapped import RecordingLike
 
 __all__ = ["estimate"]
 
 _FILTERED = " (filter, smoother)"
+_OUT = Option("Estimate to write (.csv, .parquet)", writes=ESTIMATE, what="estimate", needed=True)
+_METHOD = Option(f"Angular rate by: {', '.join(RATE_METHODS)}.", "METHOD", offers=words(*RATE_METHODS))
+_FORMS = words("auto", "linear", "joint", "recursive")
+_FORM = Option("How readings turn into p and α: auto, linear, joint or recursive.", "FORM", offers=_FORMS)
+_OMEGA = Option("Angular rate at the first sample (3,), body axes, rad/s; at rest by default.", shell=False)
+_QUATERNION = Option(
+    "Attitude (w, x, y, z) at the first sample; by default the recording's mounting, or the one that levels the mean "
+    "of p over the first second.",
+    shell=False,
+)
+_NOISE = Option(
+    "Standard deviation of one sample of each channel, scalar or (c,), m/s²; by default from the parts' data sheets.",
+    shell=False,
+)
+_PROGRESS = Option("Called with the share done, 0 to 1.", shell=False)
 
 
 @dataclass(frozen=True)
@@ -63,16 +64,9 @@ class _EstimatedRun:
     array: "AccelerometerArray"
 
 
-def _results() -> tuple[type, ...]:
-    from gfimu.motion.estimate_summary import EstimateSummary
-
-    return (EstimateSummary,)
-
-
-def _summary(run: _EstimatedRun, given: Mapping[str, Any]) -> "EstimateSummary":
+def _summary(run: _EstimatedRun, _: Mapping[str, Any]) -> "EstimateSummary":
     from gfimu.motion.estimate_summary import summarise
 
-    del given
     return summarise(run.estimate, run.recording, run.array)
 
 
@@ -94,69 +88,30 @@ def _doing(given: Mapping[str, Any]) -> str:
     return f"{doing}; compiling the filter first, once: a minute or so" if compiles else doing
 
 
-@command(results=_results, report=_summary, gives=_estimate_of, doing=_doing)
+@command(report=_summary, gives=_estimate_of, doing=_doing)
 def estimate(
-    recording: Annotated[
-        "RecordingLike",
-        Option(
-            "Recording: .csv, .parquet, or a MIMU4444 stream (.bin, .bin.gz).",
-            "RUN",
-            kind=Path,
-            argument=True,
-            reads=True,
-        ),
-    ],
-    array: Annotated["AccelerometerArray | str | Path | None", ARRAY.also("; else the recording's own")] = None,
+    recording: Annotated[given.Run, given.RUN.also(": .csv, .parquet, or a MIMU4444 stream (.bin, .bin.gz).")],
+    array: given.Array = None,
     *,
-    out: Annotated[
-        "str | Path | None",
-        Option("Estimate to write (.csv, .parquet)", kind=Path, writes=ESTIMATE, what="estimate", needed=True),
-    ] = None,
-    method: Annotated[
-        str, Option(f"Angular rate by: {', '.join(RATE_METHODS)}.", "METHOD", offers=words(*RATE_METHODS))
-    ] = "integrate",
-    form: Annotated[
-        str,
-        Option(
-            "How readings turn into p and α: auto, linear, joint or recursive.",
-            "FORM",
-            offers=words("auto", "linear", "joint", "recursive"),
-        ),
-    ] = "auto",
+    out: Annotated["str | Path | None", _OUT] = None,
+    method: Annotated[str, _METHOD] = "integrate",
+    form: Annotated[str, _FORM] = "auto",
     rest_bias: Annotated[bool, Option("Read the biases off the first rest (table level) and take them off.")] = False,
-    calibration: Annotated["Calibration | str | Path | None", CALIBRATION] = None,
-    unknown_start: Annotated[bool, UNKNOWN_START.also(_FILTERED)] = False,
-    gyro: Annotated[bool, GYRO.also(_FILTERED)] = False,
+    calibration: given.CalibrationToApply = None,
+    unknown_start: Annotated[bool, options.UNKNOWN_START.also(_FILTERED)] = False,
+    gyro: Annotated[bool, options.GYRO.also(_FILTERED)] = False,
     position: Annotated[bool, Option("Integrate to velocity and position too.")] = False,
     place: Annotated[Place, PLACE] = Place(),
-    force: Annotated[bool, FORCE] = False,
-    keep_faulty: Annotated[bool, KEEP_FAULTY.also(_FILTERED)] = False,
-    rrd: Annotated["str | Path | None", RRD] = None,
-    column_map: Annotated["ColumnMap | str | Path | None", MAP] = None,
-    max_memory: Annotated["MemorySize | None", MAX_MEMORY] = None,
+    force: Annotated[bool, options.FORCE] = False,
+    keep_faulty: Annotated[bool, options.KEEP_FAULTY.also(_FILTERED)] = False,
+    rrd: Annotated["str | Path | None", options.RRD] = None,
+    column_map: given.Map = None,
+    max_memory: given.Memory = None,
     axis: Annotated[AxisLike, AXIS] = None,
-    omega0: Annotated[
-        "ArrayLike", Option("Angular rate at the first sample (3,), body axes, rad/s; at rest by default.", shell=False)
-    ] = (0.0, 0.0, 0.0),
-    quaternion0: Annotated[
-        "ArrayLike | None",
-        Option(
-            "Attitude (w, x, y, z) at the first sample; by default the recording's mounting, or the one that levels "
-            "the mean of p over the first second.",
-            shell=False,
-        ),
-    ] = None,
-    noise_std: Annotated[
-        "ArrayLike | None",
-        Option(
-            "Standard deviation of one sample of each channel, scalar or (c,), m/s²; by default from the parts' data "
-            "sheets.",
-            shell=False,
-        ),
-    ] = None,
-    progress: Annotated[
-        Callable[[float], object] | None, Option("Called with the share done, 0 to 1.", shell=False)
-    ] = None,
+    omega0: Annotated["ArrayLike", _OMEGA] = (0.0, 0.0, 0.0),
+    quaternion0: Annotated["ArrayLike | None", _QUATERNION] = None,
+    noise_std: Annotated["ArrayLike | None", _NOISE] = None,
+    progress: Annotated[Callable[[float], object] | None, _PROGRESS] = None,
 ) -> _EstimatedRun:
     """Estimate p, α, ω, attitude and table angle at every sample of a recording.
 
@@ -179,9 +134,13 @@ def estimate(
     (3000, 3)
     """
     from gfimu.commands.opened import as_calibrated_run, as_source, name_of
+    from gfimu.motion.axis_estimation import estimate_about_axis
     from gfimu.motion.estimation import estimate as estimate_with_biases
     from gfimu.motion.rest_bias import estimate_from_rest
+    from gfimu.motion.rest_bias import rest_bias as read_off
+    from gfimu.rate.axis.few_motions import require_motions_of_samples
     from gfimu.recording.carried_array import warn_of_other_array
+    from gfimu.recording.checks import examine, without_dead_channels
     from gfimu.recording.timing.reference_times import reference_on_rows
 
     source = as_source(recording, array, column_map, max_memory=max_memory)
@@ -192,7 +151,7 @@ def estimate(
     about = as_known_axis(axis).of(geometry)
     start = None if unknown_start else omega0
     if about is None:
-        _require_all_motions(run, geometry)
+        require_motions_of_samples(geometry, run)
         there = place.of(run)
         solve = estimate_from_rest if rest_bias else estimate_with_biases
         with naming(name_of(recording)):
@@ -212,18 +171,21 @@ def estimate(
                 **there,
             )
     else:
-        if place.latitude is not None:
-            raise _useless_about_axis("--latitude")
+        useless = {"--latitude": place.latitude is not None, "--gyro": gyro, "--position": position}
+        for option, given_too in {**useless, "--keep-faulty": keep_faulty}.items():
+            if given_too:
+                raise InputError(f"{option} has no use with --axis: the rate about one axis is all that is estimated")
         with naming(name_of(recording)):
-            for name, value in (("--gyro", gyro), ("--position", position), ("--keep-faulty", keep_faulty)):
-                if value:
-                    raise _useless_about_axis(name)
-            result = _about_axis(
-                run,
+            findings = examine(run, geometry, force=force, whose="")
+            alive = without_dead_channels(run, geometry, findings)
+            if rest_bias and about.hub == "free":
+                raise InputError(
+                    "biases can't be read off the rest of a free hub, as its inclination isn't known exactly"
+                )
+            result = estimate_about_axis(
+                read_off(alive, geometry).remove(alive) if rest_bias else alive,
                 geometry,
                 about,
-                rest_bias=rest_bias,
-                force=force,
                 at_rest=start is not None,
                 smooth=rate_method(method).uses_later_samples,
                 noise_std=noise_std,
@@ -231,51 +193,10 @@ def estimate(
     if out is not None:
         result.write(out)
     if rrd is not None:
+        from gfimu.array.turning_axis import TurningAxis
         from gfimu.visual import write_run
 
-        write_run(rrd, run, _with_axis(geometry, result), estimate=result)
+        axis_found = result.metadata.get("turning_axis")
+        turning = None if axis_found is None else TurningAxis.from_dict(axis_found, source=geometry.name)
+        write_run(rrd, run, replace(geometry, turning_axis=turning or geometry.turning_axis), estimate=result)
     return _EstimatedRun(result, run, geometry)
-
-
-def _require_all_motions(recording: "Recording", array: "AccelerometerArray") -> None:
-    """Raise `GeometryError` for an array of low rank, with what it gives nevertheless."""
-    from gfimu.array.observability import unseen_motions
-    from gfimu.rate.axis.few_motions import few_motions_text
-
-    if unseen_motions(array):
-        raise GeometryError(few_motions_text(array, recording.sample_rate))
-
-
-def _useless_about_axis(option: str) -> InputError:
-    return InputError(f"{option} has no use with --axis: the rate about one axis is all that is estimated")
-
-
-def _about_axis(
-    recording: "Recording",
-    array: "AccelerometerArray",
-    axis: "TurningAxis",
-    *,
-    rest_bias: bool,
-    force: bool,
-    **options: Any,
-) -> "Estimate":
-    """Estimate about a known axis, with the biases read off a level rest first where that is asked for."""
-    from gfimu.motion.axis_estimation import estimate_about_axis
-    from gfimu.motion.rest_bias import rest_bias as read_off
-    from gfimu.recording.checks import examine, without_dead_channels
-
-    findings = examine(recording, array, force=force, whose="")
-    recording = without_dead_channels(recording, array, findings)
-    if rest_bias:
-        if axis.hub == "free":
-            raise InputError("biases can't be read off the rest of a free hub, as its inclination isn't known exactly")
-        recording = read_off(recording, array).remove(recording)
-    return estimate_about_axis(recording, array, axis, **options)
-
-
-def _with_axis(array: "AccelerometerArray", result: "Estimate") -> "AccelerometerArray":
-    """Return the array with the axis that the estimate is about, as it was found to stand, for a picture."""
-    from gfimu.array.turning_axis import TurningAxis
-
-    axis = result.metadata.get("turning_axis")
-    return array if axis is None else replace(array, turning_axis=TurningAxis.from_dict(axis, source=array.name))

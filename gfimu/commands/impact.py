@@ -7,44 +7,30 @@ gfimu impact drop.csv --array nap.toml --cfc 1000 --direction +x --picture drop.
 gfimu impact drop.csv --array nap.toml --cfc 180 --out drop_cfc180.csv --estimate drop_motion.csv
 """
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from gfimu.base.files.outputs import RECORDING
+from gfimu.commands import given
 from gfimu.commands.shell.declare import Option, command
-from gfimu.commands.shell.options import ARRAY, CALIBRATION, FORCE, MAP, MAX_MEMORY, PICTURE
+from gfimu.commands.shell.options import FORCE
 from gfimu.commands.shell.output_files import ESTIMATE
 
 if TYPE_CHECKING:
-    from gfimu.array.array import AccelerometerArray
-    from gfimu.base.files.memory import MemorySize
-    from gfimu.calibration.result import Calibration
+    from pathlib import Path
+
     from gfimu.motion.impact.event import Impact
-    from gfimu.recording.importing import ColumnMap
-    from gfimu.recording.mapped import RecordingLike
 
 __all__ = ["impact"]
 
-
-def _results() -> tuple[type, ...]:
-    from gfimu.motion.impact.event import Impact
-
-    return (Impact,)
+_FILTERED = "Recording to write (.csv, .parquet): channels zeroed and filtered, from time zero."
 
 
-@command(results=_results, doing="measuring the impact")
+@command(doing="measuring the impact")
 def impact(
     recording: Annotated[
-        "RecordingLike",
-        Option(
-            "Recording with the impact, the largest in it: .csv, .parquet; another with --map.",
-            "RUN",
-            kind=Path,
-            argument=True,
-            reads=True,
-        ),
+        given.Run, given.RUN.also(" with the impact, the largest in it: .csv, .parquet; another with --map.")
     ],
-    array: Annotated["AccelerometerArray | str | Path | None", ARRAY.also("; else the recording's own")] = None,
+    array: given.Array = None,
     *,
     cfc: Annotated[float, Option("Channel frequency class: 1000 (head), 600, 180, 60, or another.")] = 1000.0,
     standard: Annotated[Literal["sae", "iso"], Option("Of the filter: sae (J211-1) or iso (6487).", "NAME")] = "sae",
@@ -53,23 +39,14 @@ def impact(
         Literal["+x", "-x", "+y", "-y", "+z", "-z"] | None,
         Option("Where the body is accelerated (+x, -x, …): the polarity is checked."),
     ] = None,
-    calibration: Annotated["Calibration | str | Path | None", CALIBRATION] = None,
-    column_map: Annotated["ColumnMap | str | Path | None", MAP] = None,
-    max_memory: Annotated["MemorySize | None", MAX_MEMORY] = None,
-    out: Annotated[
-        "str | Path | None",
-        Option(
-            "Recording to write (.csv, .parquet): channels zeroed and filtered, from time zero.",
-            kind=Path,
-            writes=RECORDING,
-            what="recording",
-        ),
-    ] = None,
+    calibration: given.CalibrationToApply = None,
+    column_map: given.Map = None,
+    max_memory: given.Memory = None,
+    out: Annotated["str | Path | None", Option(_FILTERED, writes=RECORDING, what="recording")] = None,
     estimate: Annotated[
-        "str | Path | None",
-        Option("Estimate to write (.csv, .parquet): p, α, ω from time zero.", kind=Path, writes=ESTIMATE),
+        "str | Path | None", Option("Estimate to write (.csv, .parquet): p, α, ω from time zero.", writes=ESTIMATE)
     ] = None,
-    picture: Annotated["str | Path | None", PICTURE] = None,
+    picture: given.Picture = None,
     force: Annotated[bool, FORCE] = False,
 ) -> "Impact":
     """Measure one impact: channels zeroed and filtered to a frequency class, time zero, polarity, peaks of p, α and ω.

@@ -15,21 +15,25 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
 from gfimu.base.errors import InputError
+from gfimu.commands import given
 from gfimu.commands.shell.declare import Option, command
-from gfimu.commands.shell.options import MAX_MEMORY, TABLE
+from gfimu.commands.shell.options import TABLE
 from gfimu.commands.shell.output_files import COLUMN_MAP
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from gfimu.base.files.memory import MemorySize
     from gfimu.recording.importing import Inspection
-    from gfimu.recording.mapped import RecordingLike
     from gfimu.recording.tables.arrow import ArrowStream
 
 __all__ = ["inspect"]
 
 _MOST_COLUMNS = 40
+_FILE = Option(
+    "Text, gzipped or zipped, JSON, Parquet, Excel, MATLAB, HDF5, ULog, MCAP, ROS bag.",
+    "FILE",
+    kind=Path,
+    argument=True,
+    reads=True,
+)
 
 
 def _results() -> tuple[type, ...]:
@@ -38,30 +42,19 @@ def _results() -> tuple[type, ...]:
     return (Inspection,)
 
 
-def _report(found: "Inspection", given: "Mapping[str, Any]") -> "_Report":
-    return _Report(found, shows_map=given["out"] is None)
-
-
-@command(results=_results, report=_report, doing="looking at the file")
+@command(
+    results=_results, report=lambda found, values: _Report(found, values["out"] is None), doing="looking at the file"
+)
 def inspect(
-    file: Annotated[
-        "RecordingLike",
-        Option(
-            "Text, gzipped or zipped, JSON, Parquet, Excel, MATLAB, HDF5, ULog, MCAP, ROS bag.",
-            "FILE", kind=Path, argument=True, reads=True,
-        ),
-    ],
+    file: Annotated[given.Run, _FILE],
     *,
     table: Annotated[str, TABLE.also(" By default the one with the most accelerations.")] = "",
     out: Annotated[
         "str | Path | None",
-        Option(
-            "Column map to write (.toml), to edit and give as --map.",
-            "FILE", kind=Path, writes=COLUMN_MAP, what="map",
-        ),
+        Option("Column map to write (.toml), to edit and give as --map.", "FILE", writes=COLUMN_MAP, what="map"),
     ] = None,
-    max_memory: Annotated["MemorySize | None", MAX_MEMORY] = None,
-) -> "Inspection":  # fmt: skip
+    max_memory: given.Memory = None,
+) -> "Inspection":
     """Analyse a file of unknown layout: columns, units, rate, gaps, rails, corrupt values, chips, a map to start from.
 
     A table of pandas, polars or pyarrow, or a recording, may stand in place of the file.

@@ -12,41 +12,30 @@ gfimu join run.csv encoder.csv --reference-map encoder_map.toml --out joined.par
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+from gfimu.commands import given
 from gfimu.commands.shell.declare import Option, command
-from gfimu.commands.shell.options import ARRAY, FORCE, MAP, MAX_MEMORY, RECORDING_OUT, REFERENCE_MAP
+from gfimu.commands.shell.options import FORCE, RECORDING_OUT
 
 if TYPE_CHECKING:
-    from gfimu.array.array import AccelerometerArray
-    from gfimu.base.files.memory import MemorySize
-    from gfimu.recording.importing import ColumnMap
     from gfimu.recording.joining import Joined, ReferenceSeries
-    from gfimu.recording.mapped import RecordingLike
 
 __all__ = ["join"]
 
-
-def _results() -> tuple[type, ...]:
-    from gfimu.recording.joining import Joined
-
-    return (Joined,)
+_REFERENCE = Option(
+    "File of the tachometer, encoder, command or gyro.", "REFERENCE", argument=True, reads=True, kind=Path
+)
 
 
-@command(results=_results, doing="searching the offset between the clocks")
+@command(doing="searching the offset between the clocks")
 def join(
-    channels: Annotated[
-        "RecordingLike",
-        Option("Recording of the accelerometers.", "CHANNELS", kind=Path, argument=True, reads=True),
-    ],
-    reference: Annotated[
-        "ReferenceSeries | str | Path",
-        Option("File of the tachometer, encoder, command or gyro.", "REFERENCE", kind=Path, argument=True, reads=True),
-    ],
+    channels: Annotated[given.Run, given.RUN.also(" of the accelerometers.", metavar="CHANNELS")],
+    reference: Annotated["ReferenceSeries | str | Path", _REFERENCE],
     *,
     out: Annotated["str | Path | None", RECORDING_OUT.also(needed=True)] = None,
-    array: Annotated["AccelerometerArray | str | Path | None", ARRAY.also("; else the recording's own")] = None,
-    column_map: Annotated["ColumnMap | str | Path | None", MAP] = None,
-    reference_map: Annotated["ColumnMap | str | Path | None", REFERENCE_MAP] = None,
-    max_memory: Annotated["MemorySize | None", MAX_MEMORY] = None,
+    array: given.Array = None,
+    column_map: given.Map = None,
+    reference_map: given.ReferenceMap = None,
+    max_memory: given.Memory = None,
     most_rate_error: Annotated[
         float, Option("Largest rate error between the clocks that is searched, a ratio.")
     ] = 0.02,
@@ -67,7 +56,6 @@ def join(
     """
     from gfimu.base.files.memory import with_memory
     from gfimu.commands.opened import as_array, as_source, name_of
-    from gfimu.recording import Recording
     from gfimu.recording.checks import examine
     from gfimu.recording.formats import open_recording
     from gfimu.recording.importing import load_map
@@ -75,16 +63,14 @@ def join(
 
     drawing = None if array is None else as_array(array)
     source = as_source(channels, array, column_map, max_memory=max_memory)
-    recording = source if isinstance(source, Recording) else open_recording(source, array=drawing)
+    recording = open_recording(source, array=drawing)
     examine(recording, drawing, source=name_of(channels), force=force)
     if drawing is not None:
         recording = recording.carrying(drawing)
-    if isinstance(reference, ReferenceSeries):
-        series = reference
-    else:
+    if not isinstance(reference, ReferenceSeries):
         mapped = None if reference_map is None else load_map(reference_map)
-        series = open_reference(with_memory(reference, max_memory), mapped)
-    joined = join_reference(recording, series, most_rate_error=most_rate_error, force=force)
+        reference = open_reference(with_memory(reference, max_memory), mapped)
+    joined = join_reference(recording, reference, most_rate_error=most_rate_error, force=force)
     if out is not None:
         joined.recording.write(out)
     return joined

@@ -68,29 +68,25 @@ def as_known_axis(axis: AxisLike) -> KnownAxis:
     return KnownAxis(axis if axis is None or isinstance(axis, TurningAxis) else TurningAxis.of(axis))
 
 
+_AXIS = Option("Axis about which alone the array turns: x, y, z or 0,0,1. Few chips then suffice.", "AXIS")
+_HUB = Option("With --axis: fixed (a table) or free (a wheel on a moving body).", "KIND")
+_INCLINATION = Option(
+    "Angle between the axis and the vertical, rad; else from the data, or 0 (a free hub: π/2) where there are none.",
+    "RAD",
+)
+_DIRECTION = Option("With --axis: how exactly its direction is known, rad.", "RAD")
+_ROTATION = Option("With --axis: how exactly each chip's orientation is known, rad.", "RAD")
+
+
 def _from_options(
-    axis: Annotated[
-        str | None,
-        Option("Axis about which alone the array turns: x, y, z or 0,0,1. Few chips then suffice.", "AXIS"),
-    ] = None,
+    axis: Annotated[str | None, _AXIS] = None,
     axis_point: Annotated[_Point, Option("A point of that axis, body frame, m.", "X Y Z")] = (0.0, 0.0, 0.0),
-    hub: Annotated[
-        Literal["fixed", "free"], Option("With --axis: fixed (a table) or free (a wheel on a moving body).", "KIND")
-    ] = "fixed",
-    inclination_rad: Annotated[
-        float | None,
-        Option(
-            "Angle between the axis and the vertical, rad; else from the data, or 0 (a free hub: π/2) where there are "
-            "none.",
-            "RAD",
-        ),
-    ] = None,
+    hub: Annotated[Literal["fixed", "free"], _HUB] = "fixed",
+    inclination_rad: Annotated[float | None, _INCLINATION] = None,
     point_std_m: Annotated[float, Option("With --axis: how exactly --axis-point is known, m.", "M")] = 0.0,
-    direction_std_rad: Annotated[float, Option("With --axis: how exactly its direction is known, rad.", "RAD")] = 0.0,
+    direction_std_rad: Annotated[float, _DIRECTION] = 0.0,
     lever_std_m: Annotated[float, Option("With --axis: how exactly each chip's place is known, m.", "M")] = 0.0,
-    rotation_std_rad: Annotated[
-        float, Option("With --axis: how exactly each chip's orientation is known, rad.", "RAD")
-    ] = 0.0,
+    rotation_std_rad: Annotated[float, _ROTATION] = 0.0,
     bias_std_m_s2: Annotated[float, BIAS_STD_M_S2.also(when="With --axis: ")] = 0.0,
 ) -> KnownAxis:
     """Return what the options of the shell say of the axis."""

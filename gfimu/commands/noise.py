@@ -13,64 +13,47 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
+from gfimu.commands import given
 from gfimu.commands.known_axis import AXIS_PLACE, AxisLike, as_known_axis
+from gfimu.commands.shell import options
 from gfimu.commands.shell.declare import Option, command
-from gfimu.commands.shell.options import (
-    ARRAY,
-    CALIBRATION,
-    FORCE,
-    MAP,
-    MAX_MEMORY,
-    PICTURE,
-    REST_THRESHOLD,
-    SPEED_RAD_S,
-)
 from gfimu.commands.shell.output_files import KALIBR
 
 if TYPE_CHECKING:
-    from gfimu.array.array import AccelerometerArray
-    from gfimu.base.files.memory import MemorySize
-    from gfimu.calibration.result import Calibration
-    from gfimu.recording.importing import ColumnMap
-    from gfimu.recording.mapped import RecordingLike
+    from pathlib import Path
+
     from gfimu.sensor_noise import RecordingNoise
 
 __all__ = ["noise"]
-
-_RECORDING = Option(
-    "Recording at rest: .csv, .parquet, a MIMU4444 stream, or text rows.", "RUN", kind=Path, argument=True, reads=True
-)
 
 
 def _results() -> tuple[type, ...]:
     from gfimu.rate.axis.accuracy.noise import NoiseAboutAxis
     from gfimu.sensor_noise import RecordingNoise
 
-    return (RecordingNoise, NoiseAboutAxis)
+    return RecordingNoise, NoiseAboutAxis
 
 
 @command(results=_results, doing="identifying the noise")
 def noise(
-    recording: Annotated["RecordingLike", _RECORDING],
+    recording: Annotated[given.Run, given.RUN.also(" at rest: .csv, .parquet, a MIMU4444 stream, or text rows.")],
     *,
     stretch: Annotated[
         Literal["rest", "all"],
         Option("Samples to use: rest (the longest one) or all (up to the first gap).", "KIND"),
     ] = "rest",
-    rest_threshold: Annotated[float | None, REST_THRESHOLD] = None,
-    calibration: Annotated["Calibration | str | Path | None", CALIBRATION] = None,
+    rest_threshold: Annotated[float | None, options.REST_THRESHOLD] = None,
+    calibration: given.CalibrationToApply = None,
     kalibr: Annotated[
-        "str | Path | None", Option("Kalibr file to write (.yaml).", kind=Path, writes=KALIBR, what="Kalibr")
+        "str | Path | None", Option("Kalibr file to write (.yaml).", writes=KALIBR, what="Kalibr")
     ] = None,
-    picture: Annotated["str | Path | None", PICTURE] = None,
-    force: Annotated[bool, FORCE] = False,
-    column_map: Annotated["ColumnMap | str | Path | None", MAP] = None,
-    max_memory: Annotated["MemorySize | None", MAX_MEMORY] = None,
+    picture: given.Picture = None,
+    force: Annotated[bool, options.FORCE] = False,
+    column_map: given.Map = None,
+    max_memory: given.Memory = None,
     axis: Annotated[AxisLike, AXIS_PLACE] = None,
-    speed_rad_s: Annotated[float, SPEED_RAD_S.also(", at which that holds", when="With --axis: ")] = math.tau,
-    array: Annotated[
-        "AccelerometerArray | str | Path | None", ARRAY.also("; else the recording's own", when="With --axis: ")
-    ] = None,
+    speed_rad_s: Annotated[float, options.SPEED_RAD_S.also(", at which that holds", when="With --axis: ")] = math.tau,
+    array: Annotated[given.Array, options.ARRAY.also("; else the recording's own", when="With --axis: ")] = None,
 ) -> "RecordingNoise":
     """Identify velocity random walk N, bias instability B, acceleration random walk K, quantisation Q and ramp R.
 
@@ -94,26 +77,22 @@ def noise(
     ['a11', 'a12', 'a13']
     """
     from gfimu.base.files.atomic_file import write_text
-    from gfimu.calibration.run_file import open_calibrated, open_uncalibrated
-    from gfimu.commands.opened import as_array, as_calibration, as_run, as_source, name_of
-    from gfimu.recording import Recording
+    from gfimu.calibration.run_file import open_calibrated
+    from gfimu.commands.opened import as_array, as_calibrated_run, as_calibration, as_source, name_of
     from gfimu.recording.checks import examine
     from gfimu.sensor_noise import kalibr_yaml, recording_noise
 
     known = as_known_axis(axis)
     unit = None if calibration is None else as_calibration(calibration)
     source = as_source(recording, array, column_map, max_memory=max_memory)
-    if isinstance(source, Recording):
-        run = source if unit is None else unit.apply(source)
-    else:
-        run = open_uncalibrated(source) if unit is None else open_calibrated(source, unit)
-    given = None if array is None else as_array(array)
-    examine(run, given, source=name_of(recording), force=force)
+    run = open_calibrated(source, unit)
+    drawing = None if array is None else as_array(array)
+    examine(run, drawing, source=name_of(recording), force=force)
     result = recording_noise(run, stretch=stretch, rest_threshold=rest_threshold)
     if known.axis is not None or array is not None or "[turning_axis]" in str(run.metadata.get("array_toml", "")):
         from gfimu.rate.axis.accuracy.noise import axis_noise
 
-        geometry = given or as_run(source, None)[1]
+        geometry = drawing or as_calibrated_run(source, None)[1]
         turning = known.of(geometry)
         if turning is not None:
             result = axis_noise(result, geometry, turning, rate_rad_s=speed_rad_s)

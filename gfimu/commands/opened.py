@@ -6,7 +6,7 @@ import os
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias, TypeGuard, cast
+from typing import TYPE_CHECKING, TypeGuard, cast
 
 from gfimu.base.errors import InputError
 
@@ -19,25 +19,20 @@ if TYPE_CHECKING:
     from gfimu.model.world_model import WorldModel
     from gfimu.recording import Recording
     from gfimu.recording.importing import ColumnMap
-    from gfimu.recording.mapped import MappedFile, RecordingLike
+    from gfimu.recording.mapped import MappedFile, RecordingLike, RecordingSource
     from gfimu.recording.tables.arrow import ArrowStream
 
-Source: TypeAlias = "Recording | str | Path | MappedFile | ArrowStream"
-"""A recording, or what its readers take."""
-
 __all__ = [
-    "Source",
-    "array_of",
     "as_array",
-    "as_arrays",
+    "as_calibrated_run",
     "as_calibration",
-    "as_run",
     "as_runs",
     "as_source",
     "as_twin",
     "files_by_map",
     "is_arrays",
     "name_of",
+    "names_of",
 ]
 
 
@@ -57,46 +52,12 @@ def as_array(array: AccelerometerArray | str | Path) -> AccelerometerArray:
     return AccelerometerArray.load(array)
 
 
-def as_arrays(
-    arrays: AccelerometerArray | str | Path | Sequence[AccelerometerArray | str | Path],
-) -> list[AccelerometerArray]:
-    """Return one or several arrays, each given as `as_array` takes it."""
-    from gfimu.array.array import AccelerometerArray
-
-    return [as_array(one) for one in ([arrays] if isinstance(arrays, AccelerometerArray | str | Path) else arrays)]
-
-
-def array_of(recording: Recording) -> AccelerometerArray:
-    """Return the array that a recording carries.
-
-    Raises
-    ------
-    InputError
-        If it carries none, or names one that is not known here.
-    """
-    array = recording.array
-    if array is None:
-        raise InputError("the recording does not carry its array; give it as array")
-    return array
-
-
-def as_run(recording: Source, array: AccelerometerArray | str | Path | None) -> tuple[Recording, AccelerometerArray]:
-    """Return a recording with its array; the recording's own array if none is given."""
-    from gfimu.recording import Recording
-    from gfimu.recording.formats import open_run
-
-    drawing = None if array is None else as_array(array)
-    if isinstance(recording, Recording):
-        return recording, drawing or array_of(recording)
-    return open_run(recording, drawing)
-
-
 def as_source(
     recording: RecordingLike,
     array: AccelerometerArray | str | Path | None = None,
     column_map: ColumnMap | str | Path | None = None,
     max_memory: MemorySize | None = None,
-) -> Source:
+) -> RecordingSource:
     """Return what stands for a recording as the readers take it: the one way in for files, tables and arrays.
 
     Parameters
@@ -118,10 +79,15 @@ def as_source(
     """
     from gfimu.base.files.memory import with_memory
     from gfimu.recording import Recording
+    from gfimu.recording.importing import load_map
     from gfimu.recording.mapped import MappedFile
 
     if is_arrays(recording):
-        return _of_arrays(recording, array, mapped=column_map is not None)
+        if column_map is not None:
+            raise InputError("a map is for a file or a table; arrays of numbers have no columns to map")
+        if array is None:
+            raise InputError("NumPy arrays: times and readings do not name their array; give it as array=")
+        return Recording.from_arrays(*recording, as_array(array))
     if not isinstance(recording, Recording | str | Path | MappedFile):
         return _of_table(recording, array, column_map)
     if isinstance(recording, str | Path):
@@ -132,8 +98,6 @@ def as_source(
     if column_map is None:
         return recording
     if isinstance(recording, MappedFile):
-        from gfimu.recording.importing import load_map
-
         return replace(recording, column_map=load_map(column_map))
     raise InputError("a map is for a file, and this recording has been read already; give its file")
 
@@ -146,30 +110,17 @@ def is_arrays(recording: object) -> TypeGuard[tuple[ArrayLike, ArrayLike]]:
     return isinstance(recording, tuple) and len(recording) == 2 and all(isinstance(one, kinds) for one in recording)
 
 
-def _of_arrays(
-    recording: tuple[ArrayLike, ArrayLike], array: AccelerometerArray | str | Path | None, *, mapped: bool
-) -> Recording:
-    from gfimu.recording import Recording
-
-    if mapped:
-        raise InputError("a map is for a file or a table; arrays of numbers have no columns to map")
-    if array is None:
-        raise InputError("NumPy arrays: times and readings do not name their array; give it as array=")
-    return Recording.from_arrays(*recording, as_array(array))
-
-
 def _of_table(
     table: object,
     array: AccelerometerArray | str | Path | None,
     column_map: ColumnMap | str | Path | None,
-) -> Source:
+) -> RecordingSource:
+    from gfimu.recording.importing import load_map
+    from gfimu.recording.mapped import mapped_recording
     from gfimu.recording.tables.table_columns import TableColumns
 
     if column_map is None:
-        return cast("Source", table if isinstance(table, TableColumns) else TableColumns(table))
-    from gfimu.recording.importing import load_map
-    from gfimu.recording.mapped import mapped_recording
-
+        return cast("RecordingSource", table if isinstance(table, TableColumns) else TableColumns(table))
     chosen = load_map(column_map)
     return mapped_recording(cast("ArrowStream", table), chosen, array=None if array is None else as_array(array))
 
@@ -194,21 +145,21 @@ def as_calibration(calibration: Calibration | str | Path) -> Calibration:
 
 
 def as_calibrated_run(
-    recording: Source,
+    recording: RecordingSource,
     array: AccelerometerArray | str | Path | None,
-    calibration: Calibration | str | Path | None,
+    calibration: Calibration | str | Path | None = None,
 ) -> tuple[Recording, AccelerometerArray]:
-    """Return recording and array, corrected by the calibration where there is one."""
-    from gfimu.calibration.run_file import open_calibrated_run
-    from gfimu.recording import Recording
+    """Return a recording with its array, corrected by the calibration where there is one.
 
+    Without an array it is the recording's own.
+    """
+    from gfimu.calibration.run_file import open_calibrated_run
+    from gfimu.recording.formats import open_run
+
+    given = None if array is None else as_array(array)
     if calibration is None:
-        return as_run(recording, array)
-    unit = as_calibration(calibration)
-    if isinstance(recording, Recording):
-        run, geometry = as_run(recording, array)
-        return unit.apply(run), unit.calibrated_array(geometry)
-    return open_calibrated_run(recording, unit, None if array is None else as_array(array))
+        return open_run(recording, given)
+    return open_calibrated_run(recording, as_calibration(calibration), given)
 
 
 def as_twin(twin: WorldModel | str | Path, *, allow_code: bool) -> WorldModel:
@@ -236,3 +187,12 @@ def as_runs(recordings: RecordingLike | Sequence[RecordingLike]) -> list[Recordi
 def name_of(recording: object) -> str:
     """Return the name of a recording's file, for messages; empty for an object."""
     return os.path.basename(os.fspath(recording)) if isinstance(recording, str | os.PathLike) else ""  # noqa: PTH119
+
+
+def names_of(runs: Sequence[RecordingSource]) -> list[str]:
+    """Return names of recordings for people: file names where they distinguish them."""
+    paths = [Path(run) if isinstance(run, str | os.PathLike) else None for run in runs]
+    short = [f"run {number}" if path is None else path.name for number, path in enumerate(paths, start=1)]
+    if len(set(short)) == len(short):
+        return short
+    return [name if path is None else str(path) for path, name in zip(paths, short, strict=True)]

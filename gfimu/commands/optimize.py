@@ -16,9 +16,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from gfimu.base.errors import InputError
 from gfimu.base.files.outputs import OutputFolder
-from gfimu.commands.shell import completion
+from gfimu.commands import given
+from gfimu.commands.opened import as_array
+from gfimu.commands.shell import completion, options
 from gfimu.commands.shell.declare import Option, command
-from gfimu.commands.shell.options import CHIPS, PICTURE, PROGRESS, SEED
 from gfimu.commands.shell.output_files import ARRAY_FILE
 
 if TYPE_CHECKING:
@@ -34,75 +35,50 @@ __all__ = ["optimize"]
 
 _MOST_CHIPS, _MOST_RESTARTS = 200, 100_000  # more take days
 _MORE_CHIPS = 4  # of a front over chips, beyond the least number, unless the largest is given
+_FRONT = OutputFolder(("front.json", "front.png"), needs=("matplotlib",))
+
+_BRIEF = Option(
+    "Design brief (.toml; gfimu new brief); options replace its values.", "[BRIEF]", argument=True, reads=True
+)
+_BOX = Option(
+    "Edges of a box around the body origin, m; 0.1 0.1 0.1 by default, zero makes it flat.",
+    kind=tuple[float, float, float],
+)
+_OBJECTIVE = Option(
+    "What is to be small: gdop (default), gdop_joint, kappa, sigma_alpha, sigma_p, rate, drift, fault; with _worst at "
+    "the end over the brief's tolerances.",
+    "NAME",
+    offers=completion.objectives,
+)
+_PARETO = Option("Search the front of two objectives, or of one and chips or size; with --front.")
+_MOST = Option("Of a front over chips: the largest number of them; by default four more than the least.")
 
 
-def _results() -> tuple[type, ...]:
-    from gfimu.array_search.front import Front
-    from gfimu.array_search.search import SearchResult
-
-    return SearchResult, Front
-
-
-@command(results=_results, doing="searching arrays")
+@command(doing="searching arrays")
 def optimize(
-    chips: Annotated[int | None, CHIPS] = None,
+    chips: Annotated[int | None, options.CHIPS] = None,
     *,
-    brief: Annotated[
-        str | Path | None,
-        Option(
-            "Design brief (.toml; gfimu new brief); options replace its values.",
-            "[BRIEF]",
-            kind=Path,
-            argument=True,
-            reads=True,
-        ),
-    ] = None,
+    brief: Annotated["str | Path | None", _BRIEF] = None,
     axes_per_chip: Annotated[int | None, Option("Sensing axes of a chip: 1, 2 or 3; 3 by default.")] = None,
-    box_m: Annotated[
-        "ArrayLike | None",
-        Option(
-            "Edges of a box around the body origin, m; 0.1 0.1 0.1 by default, zero makes it flat.",
-            kind=tuple[float, float, float],
-        ),
-    ] = None,
+    box_m: Annotated["ArrayLike | None", _BOX] = None,
     min_spacing_m: Annotated[float | None, Option("Least distance between chips, m; 0.005 by default.")] = None,
     non_recursive: Annotated[bool, Option("Only arrays whose angular acceleration is free of ω².")] = False,
-    objective: Annotated[
-        str | None,
-        Option(
-            "What is to be small: gdop (default), gdop_joint, kappa, sigma_alpha, sigma_p, rate, drift, fault; with "
-            "_worst at the end over the brief's tolerances.",
-            "NAME",
-            offers=completion.objectives,
-        ),
-    ] = None,
-    pareto: Annotated[
-        tuple[str, str] | None,
-        Option("Search the front of two objectives, or of one and chips or size; with --front."),
-    ] = None,
-    most_chips: Annotated[
-        int | None, Option("Of a front over chips: the largest number of them; by default four more than the least.")
-    ] = None,
+    objective: Annotated[str | None, _OBJECTIVE] = None,
+    pareto: Annotated[tuple[str, str] | None, _PARETO] = None,
+    most_chips: Annotated[int | None, _MOST] = None,
     restarts: Annotated[int | None, Option("Most random starts; 40 by default, fewer once ten agree.")] = None,
-    seed: Annotated[int | None, SEED.also("; by default that of the brief, or 0")] = None,
-    out: Annotated[
-        str | Path | None, Option("Array file to write (.toml).", kind=Path, writes=ARRAY_FILE, what="array")
-    ] = None,
-    picture: Annotated[str | Path | None, PICTURE.also(": the array in its volume")] = None,
+    seed: Annotated[int | None, options.SEED.also("; by default that of the brief, or 0")] = None,
+    out: Annotated["str | Path | None", Option("Array file to write (.toml).", writes=ARRAY_FILE, what="array")] = None,
+    picture: Annotated[given.Picture, options.PICTURE.also(": the array in its volume")] = None,
     front: Annotated[
-        str | Path | None,
-        Option(
-            "Folder to write: the front as picture, table and array files.",
-            kind=Path,
-            writes=OutputFolder(("front.json", "front.png"), needs=("matplotlib",)),
-        ),
+        "str | Path | None", Option("Folder to write: the front as picture, table and array files.", writes=_FRONT)
     ] = None,
     rng: Annotated[
         "np.random.Generator | None", Option("Random number generator in place of the seed.", shell=False)
     ] = None,
     part: Annotated[str | None, Option("Part of the chips; by default that of the brief.", shell=False)] = None,
     name: Annotated[str, Option("Name of the array; by default that of its file.", shell=False)] = "",
-    progress: Annotated[Callable[[float], None] | None, PROGRESS] = None,
+    progress: Annotated[Callable[[float], None] | None, options.PROGRESS] = None,
 ) -> "SearchResult | Front":
     """Search the array of chips in a volume that minimises an objective, or the front of two objectives.
 
@@ -125,9 +101,10 @@ def optimize(
     >>> print(f"GDOP {found.score.gdop:.4f}")
     GDOP 1.0607
     """
+    import msgspec
     import numpy as np
 
-    from gfimu.array_search.brief import problem_of
+    from gfimu.array_search.brief import BoxTable, BriefFile, load_brief, problem_of
     from gfimu.array_search.front import find_front
     from gfimu.array_search.objectives import objective as named
     from gfimu.array_search.search import search
@@ -139,17 +116,22 @@ def optimize(
         raise InputError("--most-chips is of a front over chips; give --pareto chips OBJECTIVE --front DIR too")
     if pareto is not None and (out is not None or picture is not None):
         raise InputError("a front has many arrays, which --front takes; leave out --out and --picture")
-    _require_in_range(chips, restarts, seed)
-    changes = {
+    if (chips or 0) > _MOST_CHIPS or (restarts or 0) > _MOST_RESTARTS:
+        raise InputError(f"at most {_MOST_CHIPS} chips and {_MOST_RESTARTS} restarts are searched; give fewer")
+    changes: dict[str, Any] = {
         "chips": chips,
         "axes_per_chip": axes_per_chip,
+        "volume": None if box_m is None else BoxTable(tuple(np.asarray(box_m, dtype=float).ravel().tolist())),
         "min_spacing_m": min_spacing_m,
         "non_recursive": non_recursive or None,
         "starts": restarts,
         "seed": seed,
         "part": part,
     }
-    wanted = _changed(brief, changes, box_m, objective)
+    asked = BriefFile() if brief is None else load_brief(brief)
+    if objective is not None:
+        changes["objective"] = msgspec.structs.replace(asked.objective, name=objective)
+    wanted = msgspec.structs.replace(asked, **{key: value for key, value in changes.items() if value is not None})
     problem, conditions = problem_of(wanted, _sites(wanted, brief))
     source = np.random.default_rng(wanted.seed) if rng is None else rng
     starts = wanted.starts
@@ -170,34 +152,6 @@ def optimize(
     return result
 
 
-def _require_in_range(chips: int | None, restarts: int | None, seed: int | None) -> None:
-    if (chips or 0) > _MOST_CHIPS or (restarts or 0) > _MOST_RESTARTS:
-        raise InputError(f"at most {_MOST_CHIPS} chips and {_MOST_RESTARTS} restarts are searched; give fewer")
-    if seed is not None and seed < 0:
-        raise InputError(f"seed {seed}: must be zero or positive")
-
-
-def _changed(
-    brief: str | Path | None, changes: dict[str, Any], box_m: "ArrayLike | None", objective: str | None
-) -> "BriefFile":
-    """Return the brief, or the default one, with the values that were given besides."""
-    import msgspec
-    import numpy as np
-
-    from gfimu.array_search.brief import BoxTable, BriefFile, load_brief
-    from gfimu.array_search.shapes import box
-
-    found = BriefFile() if brief is None else load_brief(brief)
-    given = {key: value for key, value in changes.items() if value is not None}
-    if box_m is not None:
-        edges = np.asarray(box_m, dtype=float)
-        box(edges)  # refuses what is no box
-        given["volume"] = BoxTable((float(edges[0]), float(edges[1]), float(edges[2])))
-    if objective is not None:
-        given["objective"] = msgspec.structs.replace(found.objective, name=objective)
-    return msgspec.structs.replace(found, **given)
-
-
 def _sites(wanted: "BriefFile", brief: str | Path | None) -> "Sites | None":
     """Read the candidate sites of a brief, beside it or from the current directory."""
     from gfimu.array_search.brief import SitesTable, sites_of_array, sites_of_csv
@@ -212,9 +166,7 @@ def _sites(wanted: "BriefFile", brief: str | Path | None) -> "Sites | None":
 
         return sites_of_array(array_from_mjcf(path, sites=table.names), str(path))
     if path.suffix == ".toml":
-        from gfimu.array.array import AccelerometerArray
-
-        return sites_of_array(AccelerometerArray.load(path), str(path))
+        return sites_of_array(as_array(path), str(path))
     if path.suffix != ".csv":
         raise InputError(
             f"[volume] file = {table.file!r}: candidate sites come from .xml, .toml or .csv; use one of them"

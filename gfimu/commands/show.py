@@ -103,12 +103,11 @@ def _shown_file(name: str, max_memory: "MemorySize | None") -> str:
     from gfimu.base.files.memory import with_memory
     from gfimu.base.files.model_files import read_toml
     from gfimu.commands.file_kinds import check_file
-    from gfimu.commands.opened import array_of
     from gfimu.recording import Recording
 
     if not Path(name).is_file():
         raise InputError(f"{name}: no such file; give its path, or a name of gfimu list arrays")
     if not name.endswith(".toml"):
-        return array_of(Recording.read(with_memory(name, max_memory))).to_toml()
+        return Recording.read(with_memory(name, max_memory)).own_array().to_toml()
     check_file(read_toml(Path(name)), name)
     return Path(name).read_text(encoding="utf-8")

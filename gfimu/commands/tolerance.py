@@ -14,24 +14,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from gfimu.base.errors import InputError
-from gfimu.commands.shell import completion
+from gfimu.commands import given
+from gfimu.commands.shell import completion, options
 from gfimu.commands.shell.declare import Group, Option, command
-from gfimu.commands.shell.options import (
-    ARRAY,
-    BIAS_MG,
-    DURATION,
-    NOISE_UG,
-    PICTURE,
-    PROGRESS,
-    SCENARIO,
-    SEED,
-    SPEED_RAD_S,
-    WORKERS,
-)
 
 if TYPE_CHECKING:
     from gfimu.array.array import AccelerometerArray
-    from gfimu.budget.tolerances.calibrated import Poses
     from gfimu.budget.tolerances.comparison import UnitErrors
     from gfimu.budget.tolerances.result import ToleranceResult
     from gfimu.budget.tolerances.tolerances import ChipErrors
@@ -44,15 +32,24 @@ _USUAL_TIME_S = 3.0  # of the reference motion: a second at the rate, after rest
 _MOST_SAMPLES = 6000  # numerical: memory of the first-order maps, 1 GB with 24 channels
 _SHEET = "; else the data sheet's"
 
+_SCENARIO = options.SCENARIO.also("; by default rest, then a spin about the vertical", when="Motion. ")
+_NORMAL = Option("Limits are 3 σ of a normal distribution; else errors are uniform between them.")
+_PART = Option("Part of every chip, in place of those of the array.", "PART", offers=completion.parts)
+_CALIBRATED = Option(
+    "none, rest, poses or poses+rest; may be repeated; all that are possible by default.",
+    "NAME",
+    kind=list[str],
+    offers=completion.words("none", "rest", "poses", "poses+rest"),
+)
+_PICK_UP = Option(f"Pick-up of each other axis of the chip, 1 σ, %{_SHEET}.")
+
 
 def _chip_errors(
-    bias_mg: Annotated[float | None, BIAS_MG.also(_SHEET)] = None,
+    bias_mg: Annotated[float | None, options.BIAS_MG.also(_SHEET)] = None,
     gain_percent: Annotated[float | None, Option(f"Gain error, 1 σ, %{_SHEET}.")] = None,
-    cross_axis_percent: Annotated[
-        float | None, Option(f"Pick-up of each other axis of the chip, 1 σ, %{_SHEET}.")
-    ] = None,
+    cross_axis_percent: Annotated[float | None, _PICK_UP] = None,
     nonlinearity_percent: Annotated[float | None, Option(f"Non-linearity at full scale, 1 σ, %{_SHEET}.")] = None,
-    noise_ug: Annotated[float | None, NOISE_UG.also(_SHEET)] = None,
+    noise_ug: Annotated[float | None, options.NOISE_UG.also(_SHEET)] = None,
 ) -> "ChipErrors":
     """Return the errors of the chips that the options of the shell state."""
     from gfimu.base.units import MILLI_G
@@ -74,48 +71,26 @@ _CHIP = Group(
 )
 
 
-def _results() -> tuple[type, ...]:
-    from gfimu.budget.tolerances.result import ToleranceResult
-
-    return (ToleranceResult,)
-
-
-@command(results=_results, doing=lambda given: "" if given["closed_form"] else "simulating units")
+@command(doing=lambda values: "" if values["closed_form"] else "simulating units")
 def tolerance(
-    array: Annotated["AccelerometerArray | str | Path", ARRAY.also(", as drawn", argument=True)],
+    array: Annotated["AccelerometerArray | str | Path", options.ARRAY.also(", as drawn", argument=True)],
     *,
-    scenario: Annotated[
-        "Scenario | str | Path | None",
-        SCENARIO.also("; by default rest, then a spin about the vertical", when="Motion. "),
-    ] = None,
-    duration: Annotated[float | None, DURATION.also("; 3, or that of the scenario")] = None,
-    speed_rad_s: Annotated[float, SPEED_RAD_S.also(", of the default motion")] = 5.0,
+    scenario: Annotated["Scenario | str | Path | None", _SCENARIO] = None,
+    duration: Annotated[float | None, options.DURATION.also("; 3, or that of the scenario")] = None,
+    speed_rad_s: Annotated[float, options.SPEED_RAD_S.also(", of the default motion")] = 5.0,
     position_mm: Annotated[float, Option("Limit ± of each chip's place along each axis, mm.", "MM")] = 0.2,
     angle_deg: Annotated[float, Option("Limit ± of each chip's rotation about each axis, °.")] = 0.5,
-    normal: Annotated[
-        bool, Option("Limits are 3 σ of a normal distribution; else errors are uniform between them.")
-    ] = False,
-    part: Annotated[
-        str | None,
-        Option("Part of every chip, in place of those of the array.", "PART", offers=completion.parts),
-    ] = None,
+    normal: Annotated[bool, _NORMAL] = False,
+    part: Annotated[str | None, _PART] = None,
     chip: Annotated["ChipErrors | None", _CHIP] = None,
     temperature_k: Annotated[float, Option("Temperature of the run less that of the calibration, K.")] = 5.0,
-    calibrated: Annotated[
-        Sequence[str],
-        Option(
-            "none, rest, poses or poses+rest; may be repeated; all that are possible by default.",
-            "NAME",
-            kind=list[str],
-            offers=completion.words("none", "rest", "poses", "poses+rest"),
-        ),
-    ] = (),
+    calibrated: Annotated[Sequence[str], _CALIBRATED] = (),
     closed_form: Annotated[bool, Option("First order alone, without simulated units.")] = False,
     units: Annotated[int, Option("Number of simulated units.")] = 200,
-    seed: Annotated[int, SEED] = 0,
-    workers: Annotated[int | None, WORKERS] = None,
-    picture: Annotated[str | Path | None, PICTURE] = None,
-    progress: Annotated[Callable[[float], object] | None, PROGRESS] = None,
+    seed: Annotated[int, options.SEED] = 0,
+    workers: Annotated[int | None, options.WORKERS] = None,
+    picture: given.Picture = None,
+    progress: Annotated[Callable[[float], object] | None, options.PROGRESS] = None,
 ) -> "ToleranceResult":
     """Budget the errors of α, ω and position from machining and chip tolerances, and simulate units to compare.
 
@@ -142,17 +117,17 @@ def tolerance(
     from gfimu.budget.tolerances.result import ToleranceResult
     from gfimu.budget.tolerances.tolerances import Tolerances
     from gfimu.commands.opened import as_array
-    from gfimu.commands.tolerance_units import UnitTask, simulate_units
     from sim.trials.sweep.executors import processors
-    from sim.trials.worlds.toleranced import known_motion_of
+    from sim.trials.worlds.tolerance_units import UnitTask, simulate_units
+    from sim.trials.worlds.toleranced import calibration_poses, known_motion_of
 
     _check("--position-mm", position_mm)
     _check("--angle-deg", angle_deg)
     _check("--temperature-k", temperature_k)
     if not closed_form and not _LEAST_UNITS <= units <= _MOST_UNITS:
         raise InputError(f"--units {units}: give {_LEAST_UNITS} to {_MOST_UNITS}, or --closed-form for none")
-    if seed < 0 or (workers is not None and workers < 1):
-        raise InputError(f"--seed {seed}, --workers {workers}: a seed is zero or positive, workers are 1 or more")
+    if workers is not None and workers < 1:
+        raise InputError(f"--workers {workers}: workers are 1 or more")
     drawn = as_array(array)
     if part is not None:
         drawn, name = drawn.with_part_file(part)
@@ -172,7 +147,7 @@ def tolerance(
         chip=chip,
         temperature_K=temperature_k,
     )
-    posed, poses = _poses(run)
+    posed, poses = calibration_poses(run)
     maps = error_maps(drawn, motion)
     budgets = {
         name: tolerance_budget(drawn, motion, tolerances, calibration=name, poses=poses, maps=maps) for name in names
@@ -183,9 +158,9 @@ def tolerance(
         simulated = simulate_units(task, units, workers or processors(), progress=progress)
     result = ToleranceResult(drawn.name, words, motion.levelled > 0, tolerances, budgets, simulated, seed)
     if picture is not None:
-        errors = {name: found.errors for name, found in simulated.items()}
         from gfimu.budget.tolerances.picture import tolerance_picture
 
+        errors = {name: found.errors for name, found in simulated.items()}
         tolerance_picture(picture, budgets, errors, tolerances.shape, title=f"{drawn.name}: {words}")
     return result
 
@@ -219,31 +194,16 @@ def _run(
             f"at rest for {REST_S:g} s, then spun up to {speed_rad_s:g} rad/s about the vertical, {length:g} s in all"
         )
     else:
-        given = scenario if isinstance(scenario, Scenario) else Scenario.load(scenario)
-        length = given.duration if duration is None else duration
-        if not 0.0 < length <= given.duration:
+        chosen = scenario if isinstance(scenario, Scenario) else Scenario.load(scenario)
+        length = chosen.duration if duration is None else duration
+        if not 0.0 < length <= chosen.duration:
             raise InputError(
-                f"--duration {length:g}: scenario {given.name!r} lasts {given.duration:g} s; give at most that"
+                f"--duration {length:g}: scenario {chosen.name!r} lasts {chosen.duration:g} s; give at most that"
             )
-        run = replace(given, array=array, part=None, duration=length, driven=False, effects=(), earth=None)
-        words = f"scenario {given.name}, {length:g} s"
+        run = replace(chosen, array=array, part=None, duration=length, driven=False, effects=(), earth=None)
+        words = f"scenario {chosen.name}, {length:g} s"
     if not 10 <= round(run.duration * run.sample_rate) <= _MOST_SAMPLES:
         raise InputError(
             f"the run has {run.duration * run.sample_rate:.0f} samples; give a --duration with 10 to {_MOST_SAMPLES}"
         )
     return run, words
-
-
-def _poses(run: "Scenario") -> "tuple[Scenario, Poses]":
-    """Return the recording of a calibration from poses, and these poses for its prediction."""
-    import numpy as np
-
-    from gfimu.budget.tolerances.calibrated import Poses
-    from sim.motions.pose_sequence import POSE_SETS, PoseSequence
-
-    sequence = PoseSequence()
-    period = sequence.rest + sequence.turn
-    middles = np.arange(POSE_SETS[sequence.poses]) * period + 0.5 * sequence.rest
-    up = sequence.at(middles).rotation[:, 2]  # (p, 3): the world's z in body axes
-    posed = replace(run, motion=sequence, duration=sequence.duration, mounting_rotvec=(0.0, 0.0, 0.0))
-    return posed, Poses(up, round(sequence.rest * run.sample_rate))

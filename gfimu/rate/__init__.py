@@ -11,7 +11,6 @@ from gfimu.base.lazy_names import declared_names
 
 if TYPE_CHECKING:
     from gfimu.rate.axis.accuracy.bounds import axis_bounds
-    from gfimu.rate.axis.few_motions import few_motions_text
     from gfimu.rate.axis.live import LiveAxisFilter
     from gfimu.rate.bounds.sample import (
         alpha_std,

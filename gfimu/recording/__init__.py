@@ -28,8 +28,10 @@ if TYPE_CHECKING:
     from gfimu.recording.joining import ReferenceSeries, displaced_reference, join_reference, open_reference
     from gfimu.recording.mapped import mapped_recording
     from gfimu.recording.mimu4444 import is_mimu4444
+    from gfimu.recording.reading import read_bytes
     from gfimu.recording.recording import Recording
     from gfimu.recording.rest import detect_rest, motion_statistic
+    from gfimu.recording.tables.column_file import write_columns
     from gfimu.recording.timing.conversion_times import conversion_times
     from gfimu.recording.timing.reference_times import reference_on_rows, reference_series
 else:

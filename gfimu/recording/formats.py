@@ -15,7 +15,7 @@ from gfimu.base.files.memory import MemorySize, with_memory
 from gfimu.base.plugins import plugins
 from gfimu.recording.carried_array import carried_array, check_all_channels
 from gfimu.recording.importing.recognise import map_hint
-from gfimu.recording.mapped import MappedFile
+from gfimu.recording.mapped import MappedFile, RecordingSource
 from gfimu.recording.mimu4444 import is_mimu4444, read_mimu4444
 from gfimu.recording.recording import Recording
 from gfimu.recording.tables.arrow import ArrowStream
@@ -64,17 +64,14 @@ def format_of_recording(path: object) -> RecordingFormat | None:
 
 
 def open_recording(
-    path: str | Path | MappedFile | ArrowStream,
-    *,
-    array: AccelerometerArray | None = None,
-    max_memory: MemorySize | None = None,
+    path: RecordingSource, *, array: AccelerometerArray | None = None, max_memory: MemorySize | None = None
 ) -> Recording:
     """Read a recording from a CSV or Parquet file, a MIMU4444 stream, a foreign file with its map, or a table object.
 
     Parameters
     ----------
-    path : str, Path, MappedFile or table
-        The recording.
+    path : str, Path, MappedFile, table or Recording
+        The recording; one that is read already is returned as it is.
     array : AccelerometerArray, optional
         The array whose channels must be there; by default every channel found is read.
     max_memory : int or str, optional
@@ -90,6 +87,8 @@ def open_recording(
     >>> import gfimu
     >>> gfimu.open_recording("run.parquet")  # doctest: +SKIP
     """
+    if isinstance(path, Recording):
+        return path
     if isinstance(path, MappedFile):
         return path.with_memory(max_memory).read(array)
     if isinstance(path, str | Path):
@@ -113,15 +112,13 @@ def _hinting_at_maps(path: str | Path | ArrowStream) -> Iterator[None]:
         raise type(error)(f"{error}; {hint}") from None
 
 
-def open_run(
-    path: str | Path | MappedFile | ArrowStream, array: AccelerometerArray | None = None
-) -> tuple[Recording, AccelerometerArray]:
+def open_run(path: RecordingSource, array: AccelerometerArray | None = None) -> tuple[Recording, AccelerometerArray]:
     """Read a recording together with its array.
 
     Parameters
     ----------
-    path : str, Path, MappedFile or table
-        The recording, as `gfimu.Recording.read` takes it, a MIMU4444 stream, or a foreign file with its map.
+    path : str, Path, MappedFile, table or Recording
+        The recording, as `open_recording` takes it.
     array : AccelerometerArray, optional
         The array; by default the one that the recording carries or, as older ones do, names.
 
@@ -133,26 +130,24 @@ def open_run(
     """
     if array is not None:
         return open_recording(path, array=array), array
+    if isinstance(path, Recording):
+        return path, path.own_array()
+    if isinstance(path, MappedFile):
+        recording = path.read()
+        return recording, recording.own_array(f"{path}: the column map names no array; give it with --array")
     whole = format_of_recording(path)
     if whole is not None:
         recording = whole.read(cast("str | Path", path))
-        if recording.array is None:
-            raise InputError(f"{path}: the recording does not name its array; give it with --array")
-        return recording, recording.array
+        return recording, recording.own_array(f"{path}: the recording does not name its array; give it with --array")
     if isinstance(path, str | Path):
         with _hinting_at_maps(path):
             table_of_file = open_columns(path)
-            if _holds_estimate(table_of_file):
+            if set(table_of_file.names) >= _OF_ESTIMATE:
                 raise InputError(f"{path}: an estimate, no recording; gfimu view shows it; give its recording here")
             if "t_s" not in table_of_file.names:
                 Recording.read(path)  # raises what is missing first of all
             own = _own_array(table_of_file, Path(path).parent)
             return Recording.read(path, array=own), own
-    if isinstance(path, MappedFile):
-        recording = path.read()
-        if recording.array is None:
-            raise InputError(f"{path}: the column map names no array; give it with --array")
-        return recording, recording.array
     table = open_columns(path)  # an Arrow stream can be read only once
     own = _own_array(table, None)
     return Recording.read(cast("ArrowStream", table), array=own), own
@@ -163,13 +158,9 @@ def is_estimate(path: str | Path) -> bool:
     if Path(path).suffix not in {".csv", ".parquet"}:
         return False
     try:
-        return _holds_estimate(open_columns(path))
+        return set(open_columns(path).names) >= _OF_ESTIMATE
     except InputError:
         return False
-
-
-def _holds_estimate(table: ColumnFile) -> bool:
-    return set(table.names) >= _OF_ESTIMATE
 
 
 def _own_array(table: ColumnFile, beside: Path | None) -> AccelerometerArray:

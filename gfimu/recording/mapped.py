@@ -28,7 +28,7 @@ from gfimu.recording.recording import Recording
 from gfimu.recording.tables.arrow import ArrowStream
 from gfimu.recording.tables.table_columns import TableColumns
 
-__all__ = ["MappedFile", "RecordingLike", "mapped_recording", "mapped_reference"]
+__all__ = ["MappedFile", "RecordingLike", "RecordingSource", "mapped_recording", "mapped_reference"]
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,10 @@ class MappedFile(os.PathLike[str]):
         return mapped_recording([self.path, *self.others], self.column_map, array=array)
 
 
-RecordingLike = Recording | str | Path | MappedFile | ArrowStream | tuple[ArrayLike, ArrayLike]
+RecordingSource = Recording | str | Path | MappedFile | ArrowStream
+"""A recording, which its readers return as it is, or what they read one from."""
+
+RecordingLike = RecordingSource | tuple[ArrayLike, ArrayLike]
 """What stands for a recording in the arguments of a command: itself, its file, a table of pandas, polars or pyarrow, or
 times (n,), s, with readings (n, c), m/s²."""
 

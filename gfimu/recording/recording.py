@@ -176,6 +176,12 @@ class Recording(PlottedResult):
         """
         return carried_array(self.metadata)
 
+    def own_array(self, nameless: str = "") -> AccelerometerArray:
+        """Return the array that the recording carries; raises `InputError` as `array`, and ``nameless`` without one."""
+        if self.array is None:
+            raise InputError(nameless or "the recording does not carry its array; give it as array")
+        return self.array
+
     @property
     def corrupt(self) -> dict[str, int]:
         """How many values were left out of each channel or reference as they can be no measurement; empty if none."""

@@ -37,7 +37,7 @@ def broken(monkeypatch, tmp_path):
     def fail(*_, **__):
         raise ZeroDivisionError("first line\nsecond [line]")
 
-    monkeypatch.setattr(gfimu.commands.score, "as_arrays", fail)
+    monkeypatch.setattr(gfimu.commands.score, "as_array", fail)
     monkeypatch.delenv("GFIMU_DEBUG", raising=False)
 
 
@@ -86,7 +86,7 @@ def test_ctrl_c_is_one_line(gfimu_command, monkeypatch):
     def interrupt(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(gfimu.commands.score, "as_arrays", interrupt)
+    monkeypatch.setattr(gfimu.commands.score, "as_array", interrupt)
     result = gfimu_command("score", "cube12")
     assert (result.code, result.stderr) == (130, "gfimu: interrupted\n")
 
@@ -214,7 +214,7 @@ def test_an_error_of_the_system_names_its_file(gfimu_command, monkeypatch):
     def unreadable(*_, **__):
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), "some/file")
 
-    monkeypatch.setattr(gfimu.commands.score, "as_arrays", unreadable)
+    monkeypatch.setattr(gfimu.commands.score, "as_array", unreadable)
     result = gfimu_command("score")
     assert (result.code, result.stderr) == (2, "gfimu: some/file: Permission denied\n")
 

@@ -99,7 +99,7 @@ def test_an_error_of_the_system_is_an_object_too(gfimu_command, monkeypatch):
     def unreadable(*_, **__):
         raise PermissionError(13, "Permission denied", "some/file")
 
-    monkeypatch.setattr(gfimu.commands.score, "as_arrays", unreadable)
+    monkeypatch.setattr(gfimu.commands.score, "as_array", unreadable)
     result = gfimu_command("score", "--json")
     assert json.loads(result.stdout)["error"]["message"] == "some/file: Permission denied"
 

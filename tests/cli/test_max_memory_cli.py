@@ -9,9 +9,9 @@ import pytest
 import typer
 
 import gfimu
-from gfimu.base.files.memory import MemoryLimit, with_memory
-from gfimu.commands.shell.program import program
-from gfimu.recording.tables.column_file import write_columns
+from gfimu.base import MemoryLimit, with_memory
+from gfimu.commands import program
+from gfimu.recording import write_columns
 from sim.scenarios import Scenario
 from sim.simulation import memory_of
 from tests.gfimu.calibration.certificate.stage.stage_cases import calibration_of

@@ -43,15 +43,12 @@ def targets(folder: Path) -> dict[str, Target]:
     import field_files
     import foreign_files as foreign
 
-    from gfimu.array.array import AccelerometerArray
-    from gfimu.array.parts.part import Part
-    from gfimu.base.files.model_files import list_models
-    from gfimu.calibration.imu_tk import read_text_triad
-    from gfimu.calibration.result import load_calibration
-    from gfimu.recording.formats import open_recording, open_run
-    from gfimu.recording.importing import inspect_file, load_map
-    from gfimu.recording.joining import open_reference
-    from sim.rigs.mjcf_array import array_from_mjcf
+    from gfimu import AccelerometerArray, load_calibration, load_map, open_recording
+    from gfimu.array import Part
+    from gfimu.base import list_models
+    from gfimu.calibration import read_text_triad
+    from gfimu.recording import inspect_file, open_reference, open_run
+    from sim import array_from_mjcf
     from sim.scenarios import Scenario
     from sim.twin import Twin
 
@@ -133,7 +130,7 @@ def _own_recordings(folder: Path) -> dict[str, tuple[tuple[bytes, str], ...]]:
 
 def _foreign(folder: Path, foreign: Any, field: Any) -> tuple[tuple[tuple[bytes, str], ...], Mapping[str, Any]]:
     """Return foreign text files, and foreign files of other formats by the name of the format."""
-    from gfimu.recording.importing.readers.registry import format_of
+    from gfimu.recording import format_of
 
     found: dict[str, list[tuple[bytes, str]]] = {
         key: [] for key in ("text", "json", "zip", "excel", "matlab", "hdf5", "ulog", "mcap", "rosbag")
@@ -222,7 +219,7 @@ def _calibration(folder: Path) -> tuple[tuple[bytes, str], ...]:
 
 
 def _sent() -> tuple[tuple[bytes, str], ...]:
-    from firmware_bridge.frames.decoder import encode_samples
+    from firmware_bridge import encode_samples
 
     counts = np.arange(40 * 12).reshape(40, 12).astype(np.int16)
     times = np.arange(40) * 10_000
@@ -230,8 +227,8 @@ def _sent() -> tuple[tuple[bytes, str], ...]:
 
 
 def _frames(path: Path) -> None:
-    from firmware_bridge.frames.decoder import SampleDecoder
-    from gfimu.recording.reading import read_bytes
+    from firmware_bridge import SampleDecoder
+    from gfimu.recording import read_bytes
 
     decoder = SampleDecoder()
     data = read_bytes(path)
@@ -242,7 +239,7 @@ def _frames(path: Path) -> None:
 
 
 def _live(path: Path) -> None:
-    from gfimu.commands.live import live
+    from gfimu import live
 
     for _ in live("cube12", 100.0, source=path):
         pass

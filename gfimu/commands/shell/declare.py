@@ -16,8 +16,10 @@ from dataclasses import dataclass, is_dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, ParamSpec, Protocol, TypeVar, get_args, get_origin, overload
 
+from gfimu.base.declared import Declared
 from gfimu.base.errors import InputError, did_you_mean, unknown_name
 from gfimu.base.files.outputs import Output, OutputFolder, check_outputs
+from gfimu.base.lazy_names import declared_names
 from gfimu.commands.shell.completion import words
 from gfimu.commands.shell.named_files import files_named
 
@@ -42,7 +44,7 @@ class Option:
     name : str
         Name of the option on the shell, where the parameter's name does not serve.
     kind : object
-        Type of the value on the shell, where the Python parameter takes objects too.
+        Type of the value on the shell, where the Python parameter takes objects too; where it takes a path, a path.
     panel : str
         Heading under which help lists the option; empty for the first list.
     offers : callable, optional
@@ -160,7 +162,8 @@ class Command:
     report : callable, optional
         Makes what is printed of the function's result and the arguments; by default the result itself is.
     results : callable
-        Returns the classes of what is printed, for the schema.
+        Returns the classes of what is printed, for the schema; by default those that the report returns, or the
+        function.
     doing : str or callable
         What a progress bar says, or a function of the arguments that returns it; empty for none.
     run : callable, optional
@@ -301,7 +304,8 @@ def command(name: str = "", **settings: Any) -> Any:
     """Return the decorator that makes a function a command; the settings are those of `Command`."""
 
     def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
-        declared = Command(name or function.__name__, function, **settings)
+        results = functools.partial(_returned_results, settings.get("report") or function)
+        declared = Command(name or function.__name__, function, **{"results": results, **settings})
         signature = inspect.signature(function)
 
         @functools.wraps(function)
@@ -341,9 +345,9 @@ def marked(parameters: Mapping[str, inspect.Parameter], kind: type[_Mark]) -> di
     found = {}
     for name, parameter in parameters.items():
         marks = getattr(parameter.annotation, "__metadata__", ())
-        mark = next((one for one in marks if isinstance(one, kind)), None)
-        if mark is not None:
-            found[name] = mark
+        of_kind = [mark for mark in marks if isinstance(mark, kind)]
+        if of_kind:
+            found[name] = of_kind[-1]  # the command's own words, where it says more than the shared parameter
     return found
 
 
@@ -352,6 +356,14 @@ def choices_of(parameter: inspect.Parameter) -> tuple[Any, ...]:
     kind = getattr(parameter.annotation, "__origin__", None)
     kinds = get_args(kind) if get_origin(kind) is not Literal else (kind,)
     return next((get_args(one) for one in kinds if get_origin(one) is Literal), ())
+
+
+def _returned_results(function: Callable[..., Any]) -> tuple[type[Declared], ...]:
+    """Return the results that the return annotation of a function names, which its file may import for types only."""
+    names = re.findall(r"\w+", str(inspect.signature(function).return_annotation))
+    load, _, imported = declared_names(function.__module__)
+    kinds = [load(name) for name in names if name in imported]
+    return tuple(kind for kind in kinds if isinstance(kind, type) and issubclass(kind, Declared))
 
 
 def _plain_signature(signature: inspect.Signature, gives: Callable[[Any], Any] | None) -> inspect.Signature:

@@ -41,10 +41,10 @@ def files_of(diagnosis: Diagnosis, more: Collection[str] = ()) -> dict[str, str]
     diagnosis : Diagnosis
         The diagnosis.
     more : collection of str
-        Names of further text files that the twin file names.
+        Names of the text files that `write_diagnosis` writes besides.
     """
     parts = {name: f"part {Path(name).stem}" for name in diagnosis.twin.array.part_files}
-    return files_to_write() | parts | {name: Path(name).stem for name in more}
+    return files_to_write() | parts | {name: FILES.get(name, Path(name).stem) for name in more}
 
 
 def warn_of_omitted() -> None:
@@ -76,7 +76,6 @@ def write_diagnosis(
     directory: str | Path,
     diagnosis: Diagnosis,
     *,
-    twin_toml: str | None = None,
     more: Mapping[str, str] | None = None,
     rig: DrawnRig | None = None,
 ) -> dict[str, Path]:
@@ -90,10 +89,8 @@ def write_diagnosis(
         Folder; made if it isn't there, in one that is.
     diagnosis : Diagnosis
         The diagnosis.
-    twin_toml : str, optional
-        Text of the twin file; the diagnosis's own twin by default.
     more : mapping of str to str, optional
-        Further text files that the twin file names, by file name.
+        Further text files, by file name: those that the twin file names, and the twin file that names them.
     rig : DrawnRig, optional
         How the array stood on its table, for the pictures.
 
@@ -105,8 +102,6 @@ def write_diagnosis(
     folder = check_folder(directory)
     with atomic_folder(folder) as made:
         diagnosis.write(made)
-        if twin_toml is not None:
-            (made / "twin.toml").write_text(twin_toml, encoding="utf-8")
         # Part files of the user's are named by the twin or its array, and looked up beside them.
         for name, text in {**diagnosis.twin.array.part_files, **(more or {})}.items():
             (made / name).write_text(text, encoding="utf-8")

@@ -15,12 +15,14 @@ from scipy.spatial.transform import Rotation
 
 from gfimu.array.array import AccelerometerArray
 from gfimu.base.short_repr import short_repr
+from gfimu.budget.tolerances.calibrated import Poses
 from gfimu.budget.tolerances.known_motion import KnownMotion
 from gfimu.budget.tolerances.tolerances import Tolerances
 from gfimu.recording import Recording
 from gfimu.recording.carried_array import array_metadata
 from sim.chips.adxl345 import SensorErrors
 from sim.motions.motion import BodyState
+from sim.motions.pose_sequence import POSE_SETS, PoseSequence
 from sim.motions.profiles import Hold, Ramp, Segment, spin_profile
 from sim.rigs.turntable import prescribed_readings
 from sim.scenarios import Scenario
@@ -31,6 +33,7 @@ __all__ = [
     "LEAST_TIME_S",
     "REST_S",
     "ToleranceUnit",
+    "calibration_poses",
     "draw_unit",
     "known_motion_of",
     "reference_motion",
@@ -145,6 +148,16 @@ def reference_motion(array: AccelerometerArray, *, time: float, rate: float, sam
     """
     pieces: list[Segment] = [Hold(REST_S), Ramp(rate, _RAMP_S), Hold(time - LEAST_TIME_S)]
     return Scenario("reference motion", array, spin_profile(pieces), time, sample_rate, cube_offset=(0.0, 0.0, 0.0))
+
+
+def calibration_poses(run: Scenario) -> tuple[Scenario, Poses]:
+    """Return the recording of a calibration from poses with the array of a run, and these poses for its prediction."""
+    sequence = PoseSequence()
+    period = sequence.rest + sequence.turn
+    middles = np.arange(POSE_SETS[sequence.poses]) * period + 0.5 * sequence.rest
+    up = sequence.at(middles).rotation[:, 2]  # (p, 3): the world's z in body axes
+    posed = replace(run, motion=sequence, duration=sequence.duration, mounting_rotvec=(0.0, 0.0, 0.0))
+    return posed, Poses(up, round(sequence.rest * run.sample_rate))
 
 
 def known_motion_of(scenario: Scenario) -> KnownMotion:

@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from gfimu import AccelerometerArray, GeometryError, InputError
+from gfimu import AccelerometerArray, GeometryError, InputError, optimize
 from gfimu.array.dilution import gdop_lower_bound
 from gfimu.array_search.scoring import score
-from gfimu.array_search.search import optimize
 
 
 def search(n_chips, seed=1, restarts=12, **options):

@@ -15,7 +15,7 @@ from gfimu.array_search.problem import Design, Problem, Tolerance, rows_of, slop
 from gfimu.array_search.scoring import score
 from gfimu.array_search.shapes import box, frames_across
 from gfimu.rate import alpha_std
-from gfimu.rate.health.detectable import detectable_faults
+from gfimu.rate.health import detectable_faults
 
 CUBE = box((0.1, 0.1, 0.1))
 

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 import gfimu
+from gfimu import InputError
 from gfimu.base import plugins as loading
-from gfimu.base.errors import InputError
 from gfimu.base.plugins import GROUPS, plugins
 from gfimu.model.user_code import user_function
 from gfimu.rate.registry import RateMethod, rate_method
+from gfimu.recording import read_foreign
 from gfimu.recording.formats import formats
-from gfimu.recording.importing.readers import read_foreign, readers
+from gfimu.recording.importing.readers import readers
 from sim.effects import added_effects, make_effect
 from sim.twin import Twin
 
@@ -141,7 +142,7 @@ def test_a_format_is_opened_like_any_recording(installed):
 
 
 def test_a_twin_is_found_by_its_name(installed):
-    from gfimu.model.own_rig import load_model
+    from gfimu.model import load_model
 
     model = load_model("my_rig")
     assert list(model.families()) == ["radius"]

@@ -4,10 +4,8 @@ import itertools
 
 import numpy as np
 
-from gfimu.base.units import STANDARD_GRAVITY
-from gfimu.calibration.error_model import ErrorModel
+from gfimu.calibration import ErrorModel, Observations
 from gfimu.calibration.method import CalibrationTask, run_calibration
-from gfimu.calibration.observations import Observations
 from gfimu.calibration.registry import calibration_method
 
 GRAVITY = 9.81
@@ -18,9 +16,9 @@ MULTI = np.concatenate([FACES, EDGES])
 TWELVE = np.concatenate([FACES, EDGES[[0, 1, 4, 6, 8, 11]]])
 
 
-def calibrate(name, recording, gravity=STANDARD_GRAVITY, **options):
-    """Calibrate by a method of the registry, without the checks of the command."""
-    return run_calibration(calibration_method(name), CalibrationTask(recording, gravity, **options))
+def calibrate(method, recording, **settings):
+    """Calibrate by the name of a method, with fields of its task."""
+    return run_calibration(calibration_method(method), CalibrationTask(recording, **settings))
 
 
 def simulate(model, directions, rng, *, sigma=0.002, tilt=0.0, gravity=GRAVITY, unit="m_s2"):

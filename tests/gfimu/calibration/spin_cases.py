@@ -5,16 +5,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from calibration_cases import calibrate
 
-from gfimu.array.array import AccelerometerArray
-from gfimu.array.kinematics import specific_force
-from gfimu.base.units import STANDARD_GRAVITY
-from gfimu.calibration.spin import SpinPolicy, spin
-from gfimu.recording import Recording
-from gfimu.recording.carried_array import array_metadata
-from sim.chips.adxl345 import Sensor, SensorSettings
+from gfimu import AccelerometerArray, specific_force
+from gfimu.base import STANDARD_GRAVITY
+from gfimu.calibration import SpinPolicy
+from gfimu.calibration.spin import spin
+from gfimu.recording import Recording, array_metadata
+from sim import PoseSequence, Sensor, SensorSettings, speed_sweep, spin_profile
 from sim.forward import leaning, rigid_readings, table_geometry
-from sim.motions.pose_sequence import PoseSequence
-from sim.motions.profiles import speed_sweep, spin_profile
 from sim.world import Lean, World
 
 RATE = 100.0

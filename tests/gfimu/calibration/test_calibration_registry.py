@@ -9,10 +9,11 @@ from calibration_cases import GRAVITY, MULTI, calibrate
 from every_item import every
 from recordings import pose_recording
 
-from gfimu.base.errors import InputError
+from gfimu import InputError
+from gfimu.calibration import METHODS
 from gfimu.calibration.error_model import GAUGES
 from gfimu.calibration.method import CalibrationTask, run_calibration
-from gfimu.calibration.registry import METHODS, CalibrationMethod, calibration_method
+from gfimu.calibration.registry import CalibrationMethod, calibration_method
 
 
 @every("method", METHODS.values())
@@ -60,8 +61,8 @@ def counted(observations, *, gravity, gauge):
 def test_a_new_method_is_one_record(triad):
     record = CalibrationMethod(
         "counted",
-        counted,
-        METHODS["six-position"].run,
+        f"{__name__}:counted",
+        METHODS["six-position"].runner,
         needs="six faces, level",
         estimates="M and b of each chip",
         source="none",

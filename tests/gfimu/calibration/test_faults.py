@@ -7,11 +7,10 @@ import pytest
 from calibration_cases import FACES, GRAVITY, MULTI, calibrate
 from recordings import pose_recording
 
-from gfimu.base.errors import InputError
-from gfimu.calibration.observations import averaged_poses, denoised_samples, every_sample, observations_from
-from gfimu.calibration.registry import METHODS
-from gfimu.recording import Recording
-from gfimu.recording.rest import detect_rest
+from gfimu import InputError
+from gfimu.calibration import METHODS, averaged_poses, every_sample
+from gfimu.calibration.observations import denoised_samples, observations_from
+from gfimu.recording import Recording, detect_rest
 
 TRIAD_METHODS = [name for name, method in METHODS.items() if method.gauges]
 
@@ -113,7 +112,7 @@ def test_saturated_channel(triad):
 
 
 def test_coarse_counts_are_not_saturation(triad):
-    from gfimu.calibration.error_model import ErrorModel
+    from gfimu.calibration import ErrorModel
 
     counts = ErrorModel(triad.sensitivity * 25.0, triad.bias * 25.0)
     recording = pose_recording([counts], MULTI, np.random.default_rng(8), sigma=0.4, unit="lsb")

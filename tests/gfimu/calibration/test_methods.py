@@ -11,7 +11,18 @@ from gfimu.calibration.gauss_helmert import gauss_helmert
 from gfimu.calibration.multi_position import magnitude_condition, multi_position
 from gfimu.calibration.recursive import RecursiveCalibrator, recursive
 from gfimu.calibration.six_position import six_position
-from gfimu.calibration.twelve_position import coarse_solution, rotation_directions, twelve_position
+from gfimu.calibration.twelve_position import coarse_solution, twelve_position
+
+
+def rotation_directions(model):
+    """Return the parameter changes that common rotations of the axes about x, y, z make, (12, 3), orthonormal columns.
+
+    A rotation of the frame by δ changes M by −M [δ×] and no magnitude.
+    """
+    columns = [
+        np.concatenate([(-model.sensitivity @ np.cross(np.eye(3), axis)).ravel(), np.zeros(3)]) for axis in np.eye(3)
+    ]
+    return np.asarray(np.linalg.qr(np.column_stack(columns))[0], dtype=np.float64)
 
 
 def test_six_position_is_the_ferraris_solution(triad):

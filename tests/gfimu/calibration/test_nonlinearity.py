@@ -13,9 +13,14 @@ from gfimu.calibration import ErrorModel
 from gfimu.calibration.array_static import array_static, bias_places, same_specific_force
 from gfimu.calibration.fit_quality import covariance_scale, mean_factor
 from gfimu.calibration.multi_position import magnitude_condition, multi_position
-from gfimu.calibration.nonlinearity import quadratic_std, with_quadratic, without_quadratic
+from gfimu.calibration.nonlinearity import quadratic_std, with_quadratic
 from gfimu.recording import Recording
 from sim import SensorSettings
+
+
+def without_quadratic(readings, bias, quadratic):
+    """Return the straight readings b + y of bent ones b + y + q y², to second order: l − q (l − b)², shape (..., c)."""
+    return np.asarray(readings - np.asarray(quadratic) * (readings - np.asarray(bias)) ** 2, dtype=np.float64)
 
 
 @pytest.fixture(scope="module")

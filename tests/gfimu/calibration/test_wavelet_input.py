@@ -7,9 +7,9 @@ from calibration_cases import GRAVITY, MULTI
 from recordings import pose_recording
 
 from gfimu import InputError, Recording
+from gfimu.calibration import METHODS, every_sample
 from gfimu.calibration.method import CalibrationTask, run_calibration
-from gfimu.calibration.observations import THRESHOLDS, denoised_samples, every_sample, observations_from
-from gfimu.calibration.registry import METHODS
+from gfimu.calibration.observations import THRESHOLDS, denoised_samples, observations_from
 from gfimu.recording.rest import Rest
 
 SAMPLES = 800  # of a pose: 8 s at 100 Hz

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from calibration_cases import calibrate
 
-from gfimu.base.errors import InputError
-from gfimu.calibration.imu_tk import read_text_triad
+from gfimu import InputError
+from gfimu.calibration import averaged_poses, every_sample, read_text_triad
 from gfimu.calibration.multi_position import multi_position
-from gfimu.calibration.observations import averaged_poses, every_sample
-from gfimu.recording.rest import detect_rest
+from gfimu.recording import detect_rest
 
 GRAVITY = 9.81744
 FACTORY_SCALE = [415.0, 413.0, 415.0]

@@ -13,15 +13,8 @@ import numpy as np
 import pytest
 from every_item import every
 
-from gfimu.base.results.colours import (
-    AFTER_ON_PAPER,
-    AXES_ON_PAPER,
-    BEFORE_ON_PAPER,
-    INK,
-    NOISE_ON_PAPER,
-    chip_colour,
-    css,
-)
+from gfimu.base import chip_colour, css
+from gfimu.base.results.colours import AFTER_ON_PAPER, AXES_ON_PAPER, BEFORE_ON_PAPER, INK, NOISE_ON_PAPER
 from gfimu.visual.colours import AFTER, AXES, BEFORE, COMMAND, ESTIMATE, MEASURED, TACHO, TRUTH
 
 SEPARATED = {  # colours of one picture that a reader has to distinguish, by picture

@@ -13,11 +13,9 @@ from firmware_bridge.frames.decoder import StreamCounts
 from firmware_bridge.host import live
 from firmware_bridge.host.live import LiveView
 from firmware_bridge.host.recorder import Batch
-from gfimu import AccelerometerArray
-from gfimu.array.kinematics import specific_force
-from gfimu.base.results.colours import chip_colour
-from gfimu.base.units import STANDARD_GRAVITY
-from gfimu.rate.health.fault import HealthCode
+from gfimu import AccelerometerArray, specific_force
+from gfimu.base import STANDARD_GRAVITY, chip_colour
+from gfimu.rate import HealthCode
 from gfimu.rate.health.live.block import Event, Health, LiveBlock, StreamState
 from gfimu.visual.colours import HEALTH
 from gfimu.visual.live import LivePicture

@@ -10,9 +10,10 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from gfimu.base.results.colours import chip_colour
+from gfimu.base import chip_colour
+from gfimu.visual import Packed, page_plots
 from gfimu.visual.colours import PAGE, TONES
-from gfimu.visual.page import Packed, enveloped, page_plots
+from gfimu.visual.page import enveloped
 
 
 def unpacked(data: Packed) -> list[np.ndarray]:

@@ -11,8 +11,7 @@ import time
 import pytest
 
 from firmware_bridge.host.live import LiveView
-from gfimu.array.array import AccelerometerArray
-from gfimu.base.errors import GfimuError
+from gfimu import AccelerometerArray, GfimuError
 from gfimu.base.files.rerun_stream import rrd_stream
 from gfimu.visual import viewer
 from gfimu.visual.live import LivePicture

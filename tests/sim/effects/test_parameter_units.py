@@ -6,12 +6,10 @@ import numpy as np
 import pytest
 from every_item import every
 
-from gfimu import AccelerometerArray
+from gfimu import AccelerometerArray, NamedCause
 from gfimu.diagnosis.report.plain_words import parameter_texts
-from gfimu.diagnosis.verdict.parts import NamedCause
 from gfimu.model.parameter_units import KEY_ENDINGS, NAME, NUMBER, RATIO, key_name
-from sim.effects import BODY_EFFECTS, EFFECTS
-from sim.effects.base import Size
+from sim.effects import BODY_EFFECTS, EFFECTS, Size
 from sim.effects.unknown import Unknown
 
 CUBE = AccelerometerArray.load("cube12")

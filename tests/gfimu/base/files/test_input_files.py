@@ -12,11 +12,12 @@ from pathlib import Path
 
 import pytest
 
-from gfimu.base.errors import InputError
+from gfimu import InputError
+from gfimu.base import MemoryLimit
 from gfimu.base.files.input_file import check_input, is_ordinary
-from gfimu.base.files.memory import MemoryLimit
 from gfimu.base.files.model_files import parse_toml
-from gfimu.recording.reading import parsing, read_bytes, unpacked
+from gfimu.recording import read_bytes
+from gfimu.recording.reading import parsing, unpacked
 
 
 def test_ordinary_files_only(tmp_path):
@@ -128,7 +129,7 @@ def test_the_viewer_listens_on_this_machine_only(mode):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 def test_the_virtual_port_listens_on_this_machine_only():
-    from firmware_bridge.loop.virtual_port import TcpPort
+    from firmware_bridge import TcpPort
 
     before = set(listening(os.getsid(0)))
     port = TcpPort(0)

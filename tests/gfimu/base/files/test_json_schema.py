@@ -7,8 +7,9 @@ import tomllib
 import pytest
 from every_item import every
 
-from gfimu.base.errors import InputError
-from gfimu.base.files.model_files import find_model, list_models, read_toml
+from gfimu import InputError
+from gfimu.base import find_model, list_models
+from gfimu.base.files.model_files import read_toml
 from gfimu.base.files.schema import json_schema
 from gfimu.commands.file_kinds import FILE_KINDS, check_file, file_schema
 

@@ -17,9 +17,8 @@ from gfimu.budget.tolerances.calibrated import CALIBRATIONS, calibrations_of, ch
 from gfimu.budget.tolerances.comparison import compare
 from gfimu.budget.tolerances.propagation import error_maps
 from gfimu.budget.tolerances.tolerances import CAUSES, Tolerances
-from gfimu.commands.tolerance import _poses
-from gfimu.commands.tolerance_units import UnitTask, simulate_units, unit_rows
-from sim.trials.worlds.toleranced import known_motion_of, reference_motion
+from sim.trials.worlds.tolerance_units import UnitTask, simulate_units
+from sim.trials.worlds.toleranced import calibration_poses, known_motion_of, reference_motion
 
 
 def usual(array, **changes):
@@ -120,7 +119,7 @@ def test_quantiles_of_the_first_order_map_are_those_of_units():
 
 def simulated(name, calibrations, tolerances, units, workers=1):
     run = run_of(name)
-    posed, _ = _poses(run)
+    posed, _ = calibration_poses(run)
     rates = error_maps(run.array, motion_of(name)).rate is not None
     return simulate_units(UnitTask(run, posed, tolerances, calibrations, rates, 4), units, workers)
 
@@ -154,7 +153,7 @@ def test_an_array_whose_rate_diverges():
     """Units that could not be estimated are counted by their reason, and what is left is not called first order."""
     tolerances = usual(run_of("p2_face_centres").array)
     run = reference_motion(run_of("p2_face_centres").array, time=3.0, rate=5.0)
-    found = simulate_units(UnitTask(run, _poses(run)[0], tolerances, ("none", "rest"), False, 0), 20, 1)
+    found = simulate_units(UnitTask(run, calibration_poses(run)[0], tolerances, ("none", "rest"), False, 0), 20, 1)
     (reason,) = found["none"].failures
     assert found["none"].failures[reason] == 20
     assert reason.startswith("the rate diverges … s after the start")
@@ -205,10 +204,10 @@ def test_units_do_not_depend_on_workers_or_on_other_calibrations():
 
 def test_a_unit_is_the_same_in_any_batch():
     run = run_of("cube12")
-    task = UnitTask(run, _poses(run)[0], usual(run.array), ("none",), True, 4)
-    assert unit_rows(task, [2]) == unit_rows(task, range(3))[2:]
+    task = UnitTask(run, calibration_poses(run)[0], usual(run.array), ("none",), True, 4)
+    assert task.row(2) == [task.row(number) for number in range(3)][2]
     other = UnitTask(run, task.poses, task.tolerances, ("none",), True, 5)
-    assert unit_rows(other, [2]) != unit_rows(task, [2])
+    assert other.row(2) != task.row(2)
 
 
 def test_chips_with_one_axis_have_no_poses():

@@ -10,8 +10,7 @@ import pytest
 from certification_cases import calibration_of, random_covariance, random_model
 from headless_browser import headless_browser
 
-from gfimu.calibration.certificate.certify import certify
-from gfimu.calibration.certificate.page import certificate_html
+from gfimu.calibration import certificate_html, certify
 from gfimu.visual.colours import PAGE
 
 

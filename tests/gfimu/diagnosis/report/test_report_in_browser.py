@@ -10,8 +10,8 @@ import pytest
 from headless_browser import headless_browser
 from made_diagnoses import made_diagnosis
 
-from gfimu.base.results.colours import chip_colour
-from gfimu.diagnosis.report.page import report_html
+from gfimu.base import chip_colour
+from gfimu.diagnosis import report_html
 from gfimu.visual.colours import PAGE
 
 READY = "document.documentElement.dataset.ready === 'true'"

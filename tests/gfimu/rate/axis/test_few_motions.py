@@ -1,9 +1,16 @@
 """What an array of low rank gives nevertheless, in words."""
 
 import numpy as np
+import pytest
 
-from gfimu import AccelerometerArray, Chip
-from gfimu.rate import few_motions_text
+from gfimu import AccelerometerArray, Chip, GeometryError, Recording, estimate
+
+
+def few_motions_text(array, sample_rate):
+    recording = Recording.from_arrays(np.arange(20) / sample_rate, np.zeros((20, array.n_channels)), array)
+    with pytest.raises(GeometryError) as refusal:
+        estimate(recording, array)
+    return str(refusal.value)
 
 
 def test_one_chip_gives_its_force_and_names_the_axis_option():

@@ -6,10 +6,10 @@ from watched_world import CALIBRATED, CUBE, GRAVITY, RATE_HZ, readings
 
 from gfimu import InputError, SensorErrors
 from gfimu.rate import HealthCode
-from gfimu.rate.health import MonitorPolicy, watch_channels
+from gfimu.rate.health import MonitorPolicy, watch_channels, watch_from_rest
 from gfimu.rate.health.recursion.monitor_filter import MonitorFilter
 from gfimu.rate.health.recursion.signatures import new_slot
-from gfimu.rate.health.watch import watch_from_rest, watch_in_motion
+from gfimu.rate.health.watch import watch_in_motion
 
 MG = 1e-3 * GRAVITY
 NAMES = list(CUBE.channels)
@@ -135,7 +135,7 @@ def test_a_channel_that_lacks_readings_is_no_fault():
 
 
 def test_after_an_exclusion_the_rate_stays_within_its_deviation():
-    from gfimu.rate.health.monitor import ChannelMonitor
+    from gfimu.rate.health import ChannelMonitor
     from gfimu.rate.health.recursion.blocks import block_means
 
     t, y, omega = readings("tumble", 9)

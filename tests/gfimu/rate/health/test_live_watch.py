@@ -8,9 +8,9 @@ from watched_world import CALIBRATED, CUBE, GRAVITY, RATE_HZ, readings
 
 from gfimu import AccelerometerArray, InputError, LiveRateFilter, SensorErrors
 from gfimu.rate import FilterSettings, HealthCode, filter_rate, filter_stream
+from gfimu.rate.health import watch_from_rest
 from gfimu.rate.health.live.channel_watch import LiveWatch
 from gfimu.rate.health.live.watched_filter import WatchedRateFilter
-from gfimu.rate.health.watch import watch_from_rest
 
 MG = 1e-3 * GRAVITY
 ERRORS = SensorErrors.from_parts(CUBE, RATE_HZ)

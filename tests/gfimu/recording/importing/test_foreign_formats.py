@@ -4,12 +4,10 @@ import foreign_files as files
 import numpy as np
 import pytest
 
-from gfimu.base.errors import InputError, RecordingWarning
-from gfimu.recording import Recording
-from gfimu.recording.formats import open_run
-from gfimu.recording.importing import ColumnMap, inspect_file, list_maps, load_map
-from gfimu.recording.importing.column_map import REFERENCE_KINDS, ColumnSpec, TimeSpec
-from gfimu.recording.mapped import MappedFile, mapped_recording
+from gfimu import ColumnMap, InputError, MappedFile, RecordingWarning, load_map
+from gfimu.recording import ColumnSpec, Recording, inspect_file, mapped_recording, open_run
+from gfimu.recording.importing import list_maps
+from gfimu.recording.importing.column_map import REFERENCE_KINDS, TimeSpec
 from gfimu.recording.quantities import REFERENCE_UNITS
 
 GYRO = ["gyro_x_rad_s", "gyro_y_rad_s", "gyro_z_rad_s"]

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import gfimu
-from gfimu.base.errors import InputError
-from gfimu.base.plugins import user_function
+from gfimu import InputError
+from gfimu.model.user_code import user_function
 from sim.effects import EFFECTS
 from sim.trials.benchmark import baselines as package
 from sim.trials.benchmark.answer import answer_of, read_answers

@@ -10,9 +10,7 @@ import pytest
 from headless_browser import headless_browser
 
 from gfimu.visual.colours import PAGE
-from sim.trials.sweep.design import Design
-from sim.trials.sweep.picture import campaign_picture
-from sim.trials.sweep.plan import load_plan
+from sim.trials import Design, campaign_picture, load_plan
 
 PLAN = """
 design = "random"
