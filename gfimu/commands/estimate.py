@@ -134,7 +134,6 @@ def estimate(
     (3000, 3)
     """
     from gfimu.commands.opened import as_calibrated_run, as_source, name_of
-    from gfimu.motion.axis_estimation import estimate_about_axis
     from gfimu.motion.estimation import estimate as estimate_with_biases
     from gfimu.motion.rest_bias import estimate_from_rest
     from gfimu.motion.rest_bias import rest_bias as read_off
@@ -171,6 +170,8 @@ def estimate(
                 **there,
             )
     else:
+        from gfimu.motion.axis_estimation import estimate_about_axis  # not for those without an axis: scipy.optimize
+
         useless = {"--latitude": place.latitude is not None, "--gyro": gyro, "--position": position}
         for option, given_too in {**useless, "--keep-faulty": keep_faulty}.items():
             if given_too:
