@@ -273,9 +273,8 @@ def calibrate(
         first, *also = (_references(read(one)) for one in files)
         mounted = RateTable(also, table.axes, [name_of(one) for one in files])
         degrees = None if latitude is None else latitude.deg
-        result = run_calibration(
-            chosen, CalibrationTask(first, latitude_deg=degrees, rate_table=mounted, **vars(rests))
-        )
+        task = CalibrationTask(first, latitude_deg=degrees, rate_table=mounted, **vars(rests))
+        result = run_calibration(chosen, task)
         if out is not None:
             result.save(out)
         return result
