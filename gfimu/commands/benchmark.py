@@ -26,10 +26,9 @@ if TYPE_CHECKING:
     from gfimu.commands.benchmark_results import BenchmarkList, BenchmarkRun, BenchmarkWorlds
     from sim.trials.benchmark.answer import Answer
     from sim.trials.benchmark.judged import Judged
-    from sim.trials.benchmark.methods import Method
     from sim.trials.benchmark.table import Judgement
 
-__all__ = ["benchmark_list", "judge", "methods", "run", "table", "worlds"]
+__all__ = ["benchmark_list", "judge", "run", "table", "worlds"]
 
 OWN = "gfimu"
 """Name of the project's own method."""
@@ -39,13 +38,6 @@ _ANSWERS = "answers.jsonl"
 _SCHEMA = "answer.schema.json"
 _LINES = OutputFile("a file of judged answers", (".jsonl", ".xz"))
 _PROGRESS = Option("Called with the number of worlds that are done and of all.", shell=False)
-
-
-def methods() -> tuple[str, ...]:
-    """Return the names of the methods that come with the benchmark."""
-    from sim.trials.benchmark.baselines import BASELINES
-
-    return (OWN, *BASELINES)
 
 
 def _of_list() -> tuple[type, ...]:
@@ -74,9 +66,10 @@ def benchmark_list() -> "BenchmarkList":
     gfimu benchmark list --json
     """
     from gfimu.commands.benchmark_results import BenchmarkList
+    from sim.trials.benchmark.baselines import BASELINES
     from sim.trials.benchmark.release import RELEASE, SETS, release_hash
 
-    return BenchmarkList(RELEASE, release_hash(), tuple(SETS.values()), methods())
+    return BenchmarkList(RELEASE, release_hash(), tuple(SETS.values()), (OWN, *BASELINES))
 
 
 def _of_worlds() -> tuple[type, ...]:
@@ -213,9 +206,10 @@ def run(
     gfimu benchmark run greedy_bic --out greedy --sets own --limit 10
     """
     require("gfimu benchmark", "mujoco")
+    from gfimu.commands.benchmark_engine import answer
     from gfimu.commands.benchmark_results import BenchmarkRun
     from sim.trials.benchmark.answer import write_answers
-    from sim.trials.benchmark.methods import answers_of, benchmark_plan, benchmark_work
+    from sim.trials.benchmark.methods import BASELINE_METHODS, answers_of, benchmark_plan, benchmark_work, named_method
     from sim.trials.sweep.dataset import Dataset
     from sim.trials.sweep.engine import run_campaign
     from sim.trials.sweep.executors import open_workers, processors
@@ -223,7 +217,7 @@ def run(
     for option, value in (("--workers", workers), ("--limit", limit)):
         if value is not None and value < 1:
             raise InputError(f"{option} {value}: must be at least 1")
-    reference, own = _named(method)
+    reference, own = named_method(method, {OWN: answer, **BASELINE_METHODS})  # before anything is written
     dataset = Dataset.create(out, benchmark_plan(reference, _chosen(sets), split, limit, _folder(data)))
     work = functools.partial(benchmark_work, own=own)
     run_campaign(dataset, work, functools.partial(open_workers, workers or processors()), progress=progress)
@@ -341,22 +335,6 @@ def _complete(path: Path, *, partial: bool) -> "list[Answer]":
         for case in cases(name, split)
         if (method, case.world) not in given
     ]
-
-
-def _named(method: str) -> "tuple[str, Method | None]":
-    """Return how the plan names a method, a file in full, and the function of one that comes with the benchmark."""
-    from gfimu.commands.benchmark_engine import answer
-    from sim.trials.benchmark.baselines import baselines
-
-    own = {OWN: answer, **baselines()}.get(method)
-    if own is not None:
-        return f"{own.__module__}:{own.__name__}", own
-    file, colon, function = method.rpartition(":")
-    if not colon or not file.endswith(".py"):
-        raise unknown_name("method", method, methods())
-    reference = f"{Path(file).resolve()}:{function}"
-    user_function(reference, "a method")  # one that is not there is reported before anything is written
-    return reference, None
 
 
 def _folder(data: str | Path | None) -> str:

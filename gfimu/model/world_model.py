@@ -30,7 +30,6 @@ __all__ = [
     "Whitened",
     "WorldModel",
     "acts_back",
-    "axis_inclination",
     "dependence_of",
     "is_linear",
     "is_of_one_recording",
@@ -148,11 +147,6 @@ def prior_of(family: EffectFamily, families: Iterable[EffectFamily]) -> float:
 def memory_of(effect: Effect) -> float:
     """Return how long a reading depends on the drive before it by an effect, s; others need not say so."""
     return float(getattr(effect, "memory_s", 0.0))
-
-
-def axis_inclination(model: WorldModel) -> float:
-    """Return the angle between a table's axis and the vertical, rad; others than inclined tables need not say so."""
-    return float(getattr(model, "axis_inclination", 0.0))
 
 
 def reads_place(model: WorldModel) -> bool:

@@ -9,13 +9,7 @@ from typing import TYPE_CHECKING
 
 from gfimu.base.errors import InputError, unknown_name
 from gfimu.base.plugins import plugins
-from gfimu.rate.solvers import (
-    algebraic_from_rest,
-    filter_readings,
-    integrate_from_rest,
-    maximum_likelihood_from_rest,
-    smooth_readings,
-)
+from gfimu.rate import solvers
 
 if TYPE_CHECKING:
     from gfimu.rate.result import RateEstimate
@@ -75,11 +69,11 @@ class RateMethod:
 
 
 _RECORDS = (
-    RateMethod("integrate", integrate_from_rest, "α", open_loop=True),
-    RateMethod("algebraic", algebraic_from_rest, "null space, sample by sample"),
-    RateMethod("ml", maximum_likelihood_from_rest, "null space, sample by sample"),
-    RateMethod("filter", filter_readings, "α, null space, rest, gyro; samples so far", recursive=True),
-    RateMethod("smoother", smooth_readings, "the same, all samples", recursive=True, uses_later_samples=True),
+    RateMethod("integrate", solvers.integrate_from_rest, "α", open_loop=True),
+    RateMethod("algebraic", solvers.algebraic_from_rest, "null space, sample by sample"),
+    RateMethod("ml", solvers.maximum_likelihood_from_rest, "null space, sample by sample"),
+    RateMethod("filter", solvers.filter_readings, "α, null space, rest, gyro; samples so far", recursive=True),
+    RateMethod("smoother", solvers.smooth_readings, "the same, all samples", recursive=True, uses_later_samples=True),
 )
 
 RATE_METHODS: Mapping[str, RateMethod] = MappingProxyType({method.name: method for method in _RECORDS})

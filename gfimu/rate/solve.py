@@ -1,6 +1,6 @@
 """The angular rate of an estimate: α integrated, or a method that knows the errors of the sensors.
 
-`solve_rate` is the way in. The methods themselves are in `gfimu.rate.methods`.
+`solve_rate` is the way in. The methods themselves are in `gfimu.rate.solvers`.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ def _integrated_variance(t: NDArray[np.float64], variance: NDArray[np.float64]) 
 
 
 def _with_sensor_errors(method: RateMethod, problem: RateProblem) -> RateSolution:
-    """Run a method of `gfimu.rate.methods` with the errors of the parts, and of the biases as a calibration states."""
+    """Run a method of `gfimu.rate.registry` with the errors of the parts, and of the biases as a calibration states."""
     problem, names = _of_living_channels(problem)
     rate = 1.0 / float(np.median(np.diff(problem.t_s)))
     step = step_of_readings(problem.readings)

@@ -156,8 +156,7 @@ class Cause:
         return float(np.clip(self.shape[key] * np.exp(step), *self._shape_range(key)))
 
     def _shape_range(self, key: str) -> tuple[float, float]:
-        limits: Mapping[str, tuple[float, float]] = getattr(self.family, "shape_limits", {})
-        return limits.get(key, (0.0, np.inf))
+        return getattr(self.family, "shape_limits", {}).get(key, (0.0, np.inf))  # type: ignore[no-any-return]
 
 
 def effects_of(causes: Sequence[Cause], array: AccelerometerArray, run: int) -> list[Effect]:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import msgspec
 
-from gfimu.base.errors import InputError
+from gfimu.base.errors import InputError, unknown_name
 from gfimu.model.user_code import user_function
 from sim.trials.benchmark.answer import Answer, answer_of
+from sim.trials.benchmark.baselines import BASELINES, always_unknown, best_single, greedy_bic, oracle, sysid
 from sim.trials.benchmark.real import real_task
 from sim.trials.benchmark.release import MEASURED, RELEASE, cases, find_case
 from sim.trials.benchmark.truth_file import task_of
@@ -19,10 +21,40 @@ from sim.trials.sweep.dataset import Dataset
 from sim.trials.sweep.design import Case
 from sim.trials.sweep.plan import PlanFile
 
-__all__ = ["Method", "answer_task", "answers_of", "benchmark_plan", "benchmark_work"]
+__all__ = ["BASELINE_METHODS", "answer_task", "answers_of", "benchmark_plan", "benchmark_work", "named_method"]
 
 Method = Callable[[Task], Mapping[str, Any]]
 """A method: it takes a task and returns the JSON form of an `Answer`; ``world`` and ``method`` are filled in."""
+
+
+_BASELINES = zip(BASELINES, (always_unknown, best_single, greedy_bic, sysid, oracle), strict=True)
+BASELINE_METHODS: Mapping[str, Method] = {name: file.answer for name, file in _BASELINES}
+"""The baselines by name."""
+
+
+def named_method(name: str, own: Mapping[str, Method]) -> tuple[str, Method | None]:
+    """Return how a plan names a method, and its function if that comes with the benchmark.
+
+    Parameters
+    ----------
+    name : str
+        A key of ``own``, or ``FILE.py:function``.
+    own : mapping
+        Methods that come with the benchmark, by name.
+
+    Raises
+    ------
+    InputError
+        If there is none of that name, or the file or the function is not there.
+    """
+    if name in own:
+        return f"{own[name].__module__}:{own[name].__name__}", own[name]
+    file, colon, function = name.rpartition(":")
+    if not colon or not file.endswith(".py"):
+        raise unknown_name("method", name, own)
+    reference = f"{Path(file).resolve()}:{function}"
+    user_function(reference, "a method")
+    return reference, None
 
 
 def benchmark_plan(
@@ -33,7 +65,7 @@ def benchmark_plan(
     Parameters
     ----------
     reference : str
-        Method: ``FILE.py:function``, or module and name of one that comes with the benchmark.
+        Method, as `named_method` returns it.
     sets : sequence of str
         Names of sets.
     split : str
@@ -106,5 +138,4 @@ def _plain(value: Any) -> Any:
 
 def _processor_time() -> float:
     """Return the processor time of this process and those it has ended, s."""
-    times = os.times()
-    return times.user + times.system + times.children_user + times.children_system
+    return sum(os.times()[:4])

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gfimu.diagnosis.data.run import Run
 from gfimu.diagnosis.data.table.spins import State
-from gfimu.model.world_model import Effect, SpinState, WorldModel, axis_inclination
+from gfimu.model.world_model import Effect, SpinState, WorldModel
 
 __all__ = ["AngleReading", "gravity_angle"]
 
@@ -77,7 +77,7 @@ def gravity_angle(
     tuple of float, or None
         None where the axis is vertical, or nothing counts.
     """
-    if not axis_inclination(model):
+    if not getattr(model, "axis_inclination", 0.0):  # rad from the vertical; other rigs need not say so
         return None
     near = np.abs(motion.angle - motion.angle[0]) < how.turn
     stop = max(int(np.argmin(near)) if not near.all() else len(near), how.samples)

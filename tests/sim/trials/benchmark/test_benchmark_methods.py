@@ -9,16 +9,16 @@ import gfimu
 from gfimu import InputError
 from gfimu.model.user_code import user_function
 from sim.effects import EFFECTS
-from sim.trials.benchmark import baselines as package
+from sim.trials.benchmark import baselines
 from sim.trials.benchmark.answer import answer_of, read_answers
-from sim.trials.benchmark.baselines import BASELINES, baselines
+from sim.trials.benchmark.baselines import BASELINES
 from sim.trials.benchmark.baselines.best_single import _log_tail
 from sim.trials.benchmark.judge import judge
 from sim.trials.benchmark.library import LinearLibrary, stated_parameters
-from sim.trials.benchmark.methods import answer_task
+from sim.trials.benchmark.methods import BASELINE_METHODS, answer_task
 from sim.trials.benchmark.truth_file import fixed_world, task_of, truths
 
-FOLDER = Path(package.__file__).parent
+FOLDER = Path(baselines.__file__).parent
 
 
 def the_world(name, set_name="own"):
@@ -30,14 +30,14 @@ def the_world(name, set_name="own"):
 @pytest.mark.parametrize("name", sorted({file.stem for file in FOLDER.glob("*.py")} - {"__init__", "sysid"}))
 def test_a_baseline_is_shorter_than_fifty_lines(name):
     assert name in BASELINES
-    assert baselines()[name].__module__ == f"sim.trials.benchmark.baselines.{name}"
+    assert BASELINE_METHODS[name].__module__ == f"sim.trials.benchmark.baselines.{name}"
     assert len((FOLDER / f"{name}.py").read_text(encoding="utf-8").splitlines()) < 50
 
 
 @pytest.mark.parametrize("name", ["best_single", "greedy_bic", "oracle"])
 def test_baselines_name_a_large_effect_with_its_size(name):
     world = the_world("mount_tilt")
-    (found,) = judge([answer_task(baselines()[name], task_of(world))])
+    (found,) = judge([answer_task(BASELINE_METHODS[name], task_of(world))])
     assert "mount_tilt" in found.said  # the greedy one adds what slow noise looks like
     assert found.outcome == ("wrong" if name == "greedy_bic" else "alone")
     assert found.removed > 0.99
@@ -81,7 +81,7 @@ def test_sizes_become_the_parameters_of_an_answer():
 @pytest.mark.parametrize("name", ["best_single", "oracle"])
 def test_baselines_predict_a_tone(name):
     world = the_world("interference_tone")
-    (found,) = judge([answer_task(baselines()[name], task_of(world))])
+    (found,) = judge([answer_task(BASELINE_METHODS[name], task_of(world))])
     assert found.outcome == "alone"
     assert found.z  # amplitude, phase
 
