@@ -5,13 +5,14 @@ from __future__ import annotations
 import ast
 import importlib
 import sys
-from collections.abc import Callable, Collection
+import types
+from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
 from gfimu.base.optional_packages import require
 
-__all__ = ["declared_names", "homes_of"]
+__all__ = ["declared_names", "returned_type"]
 
 
 def declared_names(
@@ -31,7 +32,7 @@ def declared_names(
     without : collection of str
         Names that do without that package.
     """
-    homes = homes_of(package)
+    homes = {alias.asname: module for alias, module in _imports_for_types(package) if alias.asname}
 
     def load(name: str) -> Any:
         if name not in homes:
@@ -45,9 +46,21 @@ def declared_names(
     return load, lambda: names, names
 
 
-def homes_of(package: str) -> dict[str, str]:
-    """Return the module of each name that a package, which is imported, declares."""
+def returned_type(function: Callable[..., Any]) -> Any:
+    """Return the type that a function is annotated to return; what its module imports for type checkers is loaded."""
+    homes = {alias.name: module for alias, module in _imports_for_types(function.__module__)}
+
+    class Names(dict[str, Any]):
+        def __missing__(self, name: str) -> Any:
+            return getattr(importlib.import_module(homes[name]), name)  # a KeyError sends Python to the globals
+
+    annotated = types.SimpleNamespace(__annotations__={"returned": function.__annotations__["return"]})
+    return get_type_hints(annotated, vars(sys.modules[function.__module__]), Names())["returned"]
+
+
+def _imports_for_types(package: str) -> Iterator[tuple[ast.alias, str]]:
+    """Yield the names that a module, which is imported, imports for type checkers only, and their modules."""
     source = Path(str(sys.modules[package].__file__)).read_text(encoding="utf-8")
     blocks = [node for node in ast.parse(source).body if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node)]
     imports = [node for block in blocks for node in block.body if isinstance(node, ast.ImportFrom)]
-    return {alias.asname: str(node.module) for node in imports for alias in node.names if alias.asname}
+    yield from ((alias, str(node.module)) for node in imports for alias in node.names)

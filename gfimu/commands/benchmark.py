@@ -47,13 +47,7 @@ def methods() -> dict[str, str]:
     return {OWN: _OWN_METHOD, **BASELINES}
 
 
-def _of_list() -> tuple[type, ...]:
-    from gfimu.commands.benchmark_results import BenchmarkList
-
-    return (BenchmarkList,)
-
-
-@command("benchmark list", results=_of_list)
+@command("benchmark list")
 def benchmark_list() -> "BenchmarkList":
     """List the sets of the benchmark, their sizes and licences, and the methods that come with it.
 
@@ -78,12 +72,6 @@ def benchmark_list() -> "BenchmarkList":
     return BenchmarkList(RELEASE, release_hash(), tuple(SETS.values()), tuple(methods()))
 
 
-def _of_worlds() -> tuple[type, ...]:
-    from gfimu.commands.benchmark_results import BenchmarkWorlds
-
-    return (BenchmarkWorlds,)
-
-
 def _written_worlds(folders: list[Path], given: Any) -> "BenchmarkWorlds":
     from gfimu.commands.benchmark_results import BenchmarkWorlds
 
@@ -92,7 +80,6 @@ def _written_worlds(folders: list[Path], given: Any) -> "BenchmarkWorlds":
 
 @command(
     "benchmark worlds",
-    results=_of_worlds,
     report=_written_worlds,
     files=lambda _, given: {"worlds": given["out"], "schema": given["out"] / _SCHEMA},
     doing="worlds",
@@ -156,15 +143,8 @@ def worlds(
     return folders
 
 
-def _of_run() -> tuple[type, ...]:
-    from gfimu.commands.benchmark_results import BenchmarkRun
-
-    return (BenchmarkRun,)
-
-
 @command(
     "benchmark run",
-    results=_of_run,
     files=lambda run, _: {"answers": run.answers},
     doing=lambda given: f"benchmark {given['method']}",
     continues=True,
@@ -235,13 +215,7 @@ def run(
     return BenchmarkRun(dataset.folder, path, called, len(answers), failed)
 
 
-def _of_judgement() -> tuple[type, ...]:
-    from sim.trials.benchmark.table import Judgement
-
-    return (Judgement,)
-
-
-@command("benchmark judge", results=_of_judgement)
+@command("benchmark judge")
 def judge(
     answers: Annotated[
         str | Path | Sequence[str | Path],
@@ -289,7 +263,7 @@ def judge(
     return Judgement(tuple(judged))
 
 
-@command("benchmark table", results=_of_judgement)
+@command("benchmark table")
 def table(
     results: Annotated[
         str | Path | Sequence[str | Path],

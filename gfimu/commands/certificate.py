@@ -47,7 +47,7 @@ _REST = Option(
 )
 
 
-@command(doing="stating the calibration")
+@command(results=tuple, doing="stating the calibration")  # gfimu.commands.schema has that of the format
 def certificate(
     calibration: Annotated["Calibration | str | Path", _CALIBRATION],
     *,

@@ -31,12 +31,6 @@ FOLDER = OutputFolder(("run.parquet", "estimate.parquet", "calibration.json", "r
 """What the folder of the demo holds, beside the folder ``diagnosis``."""
 
 
-def _results() -> tuple[type, ...]:
-    from gfimu.commands.demo_steps import DemoResult
-
-    return (DemoResult,)
-
-
 def _run(given: Mapping[str, Any], as_json: bool) -> None:
     from gfimu.commands.shell.output import print_json, print_text
     from gfimu.commands.shell.printing import print_blocks
@@ -57,7 +51,7 @@ def _run(given: Mapping[str, Any], as_json: bool) -> None:
         print_blocks(result.shown())
 
 
-@command(run=_run, results=_results)
+@command(run=_run)
 def demo(
     out: Annotated[
         str | Path, Option("Folder to write; made where it is not there.", "DIR", kind=Path, writes=FOLDER)

@@ -42,13 +42,6 @@ _ASKED_RATE = RATE.also(", asked of the firmware, 10 to 3200")
 _NAMED_IMAGE = IMAGE.also(argument=True, metavar="[IMAGE]")
 
 
-def _of_run() -> tuple[type, ...]:
-    from firmware_bridge.loop.virtual_port import ServeReport
-    from firmware_bridge.loop.virtual_run import VirtualRun
-
-    return VirtualRun, ServeReport
-
-
 def _run_on_shell(given: Mapping[str, Any], as_json: bool) -> None:
     from gfimu.commands.shell.output import print_text
     from gfimu.commands.shell.printing import print_report
@@ -98,7 +91,6 @@ def run(
 
 @command(
     "firmware run",
-    results=_of_run,
     run=_run_on_shell,
     doing=lambda given: f"running {given['image']}" if given["port"] is None else "",
 )
@@ -196,12 +188,6 @@ def _behind_port(
         line.close()
 
 
-def _of_build() -> tuple[type, ...]:
-    from firmware_bridge.lpc1768.build import BuildReport
-
-    return (BuildReport,)
-
-
 def _definitions(
     define: Annotated[list[str], Option("Preprocessor definition; may be repeated.", "NAME=VALUE")] = (),  # type: ignore[assignment]
 ) -> dict[str, str]:
@@ -217,7 +203,6 @@ def _definitions(
 
 @command(
     "firmware build",
-    results=_of_build,
     doing="compiling",
     files=lambda report, _: {"ELF file": report.elf, "image": report.binary},
 )
@@ -255,15 +240,8 @@ def build(
     return build_image(image, out, array=array, defines={**speed, **(define or {})})
 
 
-def _of_selftest() -> tuple[type, ...]:
-    from firmware_bridge.loop.selftest import SelfTestReport
-
-    return (SelfTestReport,)
-
-
 @command(
     "firmware selftest",
-    results=_of_selftest,
     doing="testing the emulator and the firmware",
     exit_code=lambda report: int(not report.passed),
 )
@@ -283,13 +261,7 @@ def selftest() -> "SelfTestReport":
     return run_selftest()
 
 
-def _of_trace() -> tuple[type, ...]:
-    from firmware_bridge.board.trace import TraceCounts
-
-    return (TraceCounts,)
-
-
-@command("firmware trace", results=_of_trace, doing=lambda given: f"tracing {given['image']}")
+@command("firmware trace", doing=lambda given: f"tracing {given['image']}")
 def trace(
     out: Annotated[
         str | Path,
@@ -336,13 +308,7 @@ def trace(
     )
 
 
-def _of_faults() -> tuple[type, ...]:
-    from firmware_bridge.loop.fault_campaign import FaultReport
-
-    return (FaultReport,)
-
-
-@command("firmware faults", results=_of_faults, doing="faults", exit_code=lambda report: int(not report.passed))
+@command("firmware faults", doing="faults", exit_code=lambda report: int(not report.passed))
 def faults(
     *,
     seed: Annotated[int, SEED] = 0,
@@ -365,15 +331,8 @@ def faults(
     return run_campaign(seed=seed, progress=progress)
 
 
-def _of_check() -> tuple[type, ...]:
-    from firmware_bridge.strict.check import CheckReport
-
-    return (CheckReport,)
-
-
 @command(
     "firmware check",
-    results=_of_check,
     doing=lambda given: f"running {given['image']}",
     exit_code=lambda report: int(report.faults > 0),
 )

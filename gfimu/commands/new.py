@@ -55,7 +55,7 @@ def _report(text: str, given: Any) -> Begun:
     return Begun(given["kind"], text, bool(_files(text, given)))
 
 
-@command(report=_report, files=_files, results=lambda: (Begun,))
+@command(report=_report, files=_files)
 def new(
     kind: Annotated[
         str,

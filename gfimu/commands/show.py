@@ -47,7 +47,7 @@ def _report(text: str, given: Any) -> Shown:
     return Shown(given["name"], text)
 
 
-@command(report=_report, results=lambda: (Shown,))
+@command(report=_report)
 def show(
     name: Annotated[
         str,

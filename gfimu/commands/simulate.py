@@ -27,17 +27,11 @@ if TYPE_CHECKING:
 __all__ = ["simulate"]
 
 
-def _results() -> tuple[type, ...]:
-    from sim.simulation import Simulated
-
-    return (Simulated,)
-
-
 def _recording(simulated: "Simulated") -> "Recording":
     return simulated.recording
 
 
-@command(results=_results, gives=_recording, doing=lambda given: f"simulating {given['scenario']}")
+@command(gives=_recording, doing=lambda given: f"simulating {given['scenario']}")
 def simulate(
     scenario: Annotated["Scenario | str | Path", SCENARIO.also(" or a twin file", argument=True)],
     *,

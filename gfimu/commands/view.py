@@ -34,12 +34,6 @@ if TYPE_CHECKING:
 __all__ = ["view"]
 
 
-def _results() -> tuple[type, ...]:
-    from gfimu.visual.picture import Viewed
-
-    return (Viewed,)
-
-
 def _opened(viewed: "Viewed") -> Path:
     """Open the picture where that is asked for, and return it."""
     from gfimu.visual.viewer import open_viewer
@@ -66,7 +60,7 @@ def _show(given: Mapping[str, Any], as_json: bool) -> None:
         _opened(viewed)
 
 
-@command(results=_results, gives=_opened, run=_show)
+@command(gives=_opened, run=_show)
 def view(
     file: Annotated[
         "RecordingLike | Estimate | Diagnosis",

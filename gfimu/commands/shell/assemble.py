@@ -6,6 +6,7 @@ import functools
 import inspect
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Annotated, Any
 
 from gfimu.commands.shell.declare import Command, Option, choices_of, marked
@@ -63,7 +64,7 @@ def _with_parts(declared: Command) -> Command:
 
 def _shell_parameter(name: str, parameter: inspect.Parameter, option: Option) -> inspect.Parameter:
     """Return a parameter as Typer takes it."""
-    kind = option.kind or parameter.annotation.__origin__
+    kind = option.kind or (parameter.annotation.__origin__ if option.writes is None else Path)
     default = inspect.Parameter.empty if option.needed else None if parameter.default == () else parameter.default
     words_only = str if choices_of(parameter) else kind
     optional: Any = words_only | None if default is None else words_only

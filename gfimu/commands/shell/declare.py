@@ -11,6 +11,7 @@ import functools
 import inspect
 import re
 import textwrap
+import types
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, is_dataclass, replace
 from pathlib import Path
@@ -18,6 +19,7 @@ from typing import Annotated, Any, Literal, ParamSpec, Protocol, TypeVar, get_ar
 
 from gfimu.base.errors import InputError, did_you_mean, unknown_name
 from gfimu.base.files.outputs import Output, OutputFolder, check_outputs, files_named
+from gfimu.base.lazy_names import returned_type
 from gfimu.commands.shell.completion import words
 
 __all__ = ["Command", "Group", "Option", "choices_of", "command", "command_of", "marked", "module_help"]
@@ -41,7 +43,7 @@ class Option:
     name : str
         Name of the option on the shell, where the parameter's name does not serve.
     kind : object
-        Type of the value on the shell, where the Python parameter takes objects too.
+        Type of the value on the shell, where the Python parameter takes objects too; of an output a path.
     panel : str
         Heading under which help lists the option; empty for the first list.
     offers : callable, optional
@@ -158,8 +160,9 @@ class Command:
         The function, unchecked.
     report : callable, optional
         Makes what is printed of the function's result and the arguments; by default the result itself is.
-    results : callable
-        Returns the classes of what is printed, for the schema.
+    results : callable, optional
+        Returns the classes of what is printed, for the schema, where what the report or the function is annotated to
+        return does not say them.
     doing : str or callable
         What a progress bar says, or a function of the arguments that returns it; empty for none.
     run : callable, optional
@@ -181,7 +184,7 @@ class Command:
     name: str
     function: Callable[..., Any]
     report: Callable[[Any, _Given], Shown] | None = None
-    results: Callable[[], tuple[Any, ...]] = tuple
+    results: Callable[[], tuple[Any, ...]] | None = None
     doing: str | Callable[[_Given], str] = ""
     run: Callable[..., None] | None = None
     files: Callable[[Any, _Given], Mapping[str, Path]] | None = None
@@ -223,6 +226,14 @@ class Command:
         """Parameters of the options that the shell alone has, by name."""
         parameters = {} if self.run is None else dict(inspect.signature(self.run).parameters)
         return {name: parameters[name] for name in marked(parameters, Option)}
+
+    @property
+    def printed(self) -> tuple[Any, ...]:
+        """Classes of what is printed."""
+        if self.results is not None:
+            return self.results()
+        kind = returned_type(self.report or self.function)
+        return get_args(kind) if isinstance(kind, types.UnionType) else (kind,)
 
     @property
     def writes(self) -> bool:
