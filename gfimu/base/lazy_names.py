@@ -12,7 +12,7 @@ from typing import Any, get_type_hints
 
 from gfimu.base.optional_packages import require
 
-__all__ = ["declared_names", "returned_type"]
+__all__ = ["declared_names", "homes_of", "returned_type"]
 
 
 def declared_names(
@@ -32,7 +32,7 @@ def declared_names(
     without : collection of str
         Names that do without that package.
     """
-    homes = {alias.asname: module for alias, module in _imports_for_types(package) if alias.asname}
+    homes = homes_of(package)
 
     def load(name: str) -> Any:
         if name not in homes:
@@ -44,6 +44,11 @@ def declared_names(
 
     names = sorted(homes)
     return load, lambda: names, names
+
+
+def homes_of(package: str) -> dict[str, str]:
+    """Return the module of each name that a package, which is imported, declares."""
+    return {alias.asname: module for alias, module in _imports_for_types(package) if alias.asname}
 
 
 def returned_type(function: Callable[..., Any]) -> Any:

@@ -50,15 +50,15 @@ MAX_MEMORY = Option(
     "Memory that reading a file may take, as 2GB; by default four times its size and 500 MB", "SIZE", kind=str
 )
 NOISE_UG = Option("White noise of each channel, one-sided density, µg/√Hz", "UG")
-PICTURE = Option("Picture to write (.png, .svg, .pdf)", "FILE", kind=Path, writes=PICTURE_FILE)
+PICTURE = Option("Picture to write (.png, .svg, .pdf)", "FILE", writes=PICTURE_FILE)
 PORT = Option("Port of the board", "PORT")
 PROGRESS = Option("Called with the share done, 0 to 1, and a line of text", shell=False)
 RANGE = Option("Range of the chips: ±2, 4, 8 or 16 g", "G")
 RATE = Option("Sample rate, Hz", "HZ")
 RECORDINGS = Option("Recordings of one rig: .csv, .parquet, .bin", "RUN...", kind=list[Path], argument=True, reads=True)
-RECORDING_OUT = Option("Recording to write (.csv, .parquet).", "FILE", kind=Path, writes=RECORDING, what="recording")
+RECORDING_OUT = Option("Recording to write (.csv, .parquet).", "FILE", writes=RECORDING, what="recording")
 REST_THRESHOLD = Option("Threshold of rest, reading unit squared; else from the data.", "UNIT²")
-RRD = Option("Rerun recording to write (.rrd)", "FILE", kind=Path, writes=RERUN)
+RRD = Option("Rerun recording to write (.rrd)", "FILE", writes=RERUN)
 SCENARIO = Option(
     "Scenario: a name, or a scenario file (.toml)", "SCENARIO", offers=completion.scenarios, kind=str, reads=True
 )
@@ -69,6 +69,7 @@ SETS = Option(
     kind=list[str],
     offers=completion.words("own", "independent", "unlisted", "dcmotor", "real"),
 )
+SHARE = Option("Called with the share done, 0 to 1.", shell=False)
 SPEED_RAD_S = Option("Angular rate, rad/s", "RAD/S")
 SPLIT = Option(
     "Worlds to develop on (dev), or those of the published table (test).",

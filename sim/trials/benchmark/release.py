@@ -28,6 +28,7 @@ __all__ = [
     "Case",
     "SetInfo",
     "cases",
+    "chosen_cases",
     "find_case",
     "release_hash",
 ]
@@ -223,6 +224,12 @@ def cases(set_name: str, split: str) -> tuple[Case, ...]:
     else:
         made = [Case("real", split, number, MEASURED) for number in range(2 if split == "test" else 0)]
     return tuple(made)
+
+
+def chosen_cases(sets: Iterable[str], split: str, limit: int | None = None) -> list[Case]:
+    """Return the worlds of some sets, at most so many of each; of all sets that are drawn where none is named."""
+    drawn = (name for name in SETS if name != "real")
+    return [case for name in dict.fromkeys(sets) or drawn for case in cases(name, split)[:limit]]
 
 
 def find_case(world: str) -> Case:

@@ -28,10 +28,10 @@ from firmware_bridge.strict.check import CheckReport
 from firmware_bridge.strict.findings import Finding
 from gfimu.base.lazy_names import homes_of
 from gfimu.base.results import PlottedResult, TableResult
-from gfimu.commands.benchmark_results import BenchmarkRun
 from gfimu.commands.demo_steps import DemoResult, Row
 from gfimu.recording.joining import ReferenceSeries, join_reference
 from sim.trials.benchmark.judged import Judged
+from sim.trials.benchmark.results import BenchmarkRun
 from sim.trials.benchmark.table import Judgement
 from sim.trials.sweep.pace import Run
 from sim.trials.sweep.results import CampaignStatus
