@@ -40,6 +40,12 @@ if TYPE_CHECKING:
 __all__ = ["live"]
 
 _RATES = 1e-3, 1e6  # Hz
+_FROM = Option(
+    "Where samples come from: - (standard input), a recording, or host:port of a TCP server.", name="--from", kind=str,
+    reads=True,
+)  # fmt: skip
+_FOLLOW = Option("With a recording: go on reading while gfimu record writes it.")
+_SCALE_STD = Option("Uncertainty of the scale factors, a ratio (0.01 is 1 %).")
 _START_S = 3.0  # of a stream, which are examined
 _FEWEST, _MOST = 50, 5000  # samples of that start
 
@@ -65,17 +71,9 @@ def live(
     array: Annotated["AccelerometerArray | str | Path | None", ARRAY.also("; else the stream's own")] = None,
     rate: Annotated[float | None, RATE.also(", nominal; else the stream's own")] = None,
     *,
-    source: Annotated[
-        "str | Path | Iterable[str]",
-        Option(
-            "Where samples come from: - (standard input), a recording, or host:port of a TCP server.",
-            name="--from",
-            kind=str,
-            reads=True,
-        ),
-    ] = "-",
-    follow: Annotated[bool, Option("With a recording: go on reading while gfimu record writes it.")] = False,
-    scale_std: Annotated[float, Option("Uncertainty of the scale factors, a ratio (0.01 is 1 %).")] = 0.0,
+    source: Annotated["str | Path | Iterable[str]", _FROM] = "-",
+    follow: Annotated[bool, _FOLLOW] = False,
+    scale_std: Annotated[float, _SCALE_STD] = 0.0,
     bias_std_m_s2: Annotated[float | None, BIAS_STD_M_S2.also("; else the data sheets'")] = None,
     unknown_start: Annotated[bool, UNKNOWN_START] = False,
     gyro: Annotated[bool, GYRO] = False,

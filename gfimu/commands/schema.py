@@ -89,6 +89,10 @@ def _offers(incomplete: str) -> list[tuple[str, str]]:
     return beginning(incomplete, dict.fromkeys(name.partition(" ")[0] for name in schema_names()))
 
 
+_COMMAND = Option("Command: estimate, or campaign table.", "COMMAND...", kind=list[str], argument=True, offers=_offers)
+_OUT = Option("JSON schema to write (.json); printed without it.", "FILE", writes=JSON_SCHEMA)
+
+
 def _run(given: Mapping[str, Any], as_json: bool) -> None:
     from gfimu.commands.shell.output import print_json, print_paths
 
@@ -101,21 +105,9 @@ def _run(given: Mapping[str, Any], as_json: bool) -> None:
 
 @command(run=_run)
 def schema(
-    command: Annotated[
-        str,
-        Option(
-            "Command: estimate, or campaign table.",
-            "COMMAND...",
-            kind=list[str],
-            argument=True,
-            offers=_offers,
-        ),
-    ],
+    command: Annotated[str, _COMMAND],
     *,
-    out: Annotated[
-        str | Path | None,
-        Option("JSON schema to write (.json); printed without it.", "FILE", kind=Path, writes=JSON_SCHEMA),
-    ] = None,
+    out: Annotated[str | Path | None, _OUT] = None,
 ) -> dict[str, Any]:
     """Return the JSON schema (2020-12) of a command's output with ``--json``, errors included.
 

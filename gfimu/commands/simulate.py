@@ -9,12 +9,13 @@ gfimu simulate paper_run --out run.csv --set sensor.range_g=8 --set duration_s=5
 gfimu simulate tumble --out tumble.parquet --rrd tumble.rrd
 """
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from gfimu.base.errors import InputError
 from gfimu.commands.shell.declare import Option, command
-from gfimu.commands.shell.options import MAX_MEMORY, RECORDING_OUT, RRD, SCENARIO, SEED
+from gfimu.commands.shell.options import MAX_MEMORY, RECORDING_OUT, RRD, SCENARIO, SEED, SHARE
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
     from sim.simulation import Simulated
 
 __all__ = ["simulate"]
+
+_CHANGES = Option("Change a key of the scenario file; may be repeated.", "KEY=VALUE", name="--set", kind=list[str])
+_RAW = Option("Keep the readings as counts of the converter.")
 
 
 def _recording(simulated: "Simulated") -> "Recording":
@@ -37,16 +41,11 @@ def simulate(
     *,
     out: Annotated["str | Path | None", RECORDING_OUT.also(needed=True)] = None,
     seed: Annotated[int, SEED] = 0,
-    changes: Annotated[
-        "Sequence[str]",
-        Option("Change a key of the scenario file; may be repeated.", "KEY=VALUE", name="--set", kind=list[str]),
-    ] = (),
-    raw: Annotated[bool, Option("Keep the readings as counts of the converter.")] = False,
+    changes: Annotated["Sequence[str]", _CHANGES] = (),
+    raw: Annotated[bool, _RAW] = False,
     max_memory: Annotated["MemorySize | None", MAX_MEMORY.also("; of the run, half of the machine's")] = None,
     rrd: Annotated["str | Path | None", RRD] = None,
-    progress: Annotated[
-        "Callable[[float], None] | None", Option("Called with the share done, 0 to 1.", shell=False)
-    ] = None,
+    progress: Annotated["Callable[[float], None] | None", SHARE] = None,
 ) -> "Simulated":
     """Simulate a scenario on the MuJoCo turntable and return what the board would have recorded.
 
@@ -89,8 +88,6 @@ def simulate(
 
 def _draw(rrd: "str | Path", run: "Scenario", recording: "Recording") -> None:
     """Draw what was simulated: on its turntable, about a level or inclined axis, on a carriage, or free."""
-    from dataclasses import replace
-
     from gfimu.visual import write_run
     from sim.drawing import array_on_axis, rig_drawing
     from sim.truth import known_motion
@@ -107,8 +104,6 @@ def _draw(rrd: "str | Path", run: "Scenario", recording: "Recording") -> None:
 
 def _in_si(recording: "Recording") -> "Recording":
     """Return the readings in m/s²."""
-    from dataclasses import replace
-
     if recording.unit == "m_s2":
         return recording
     return replace(recording, readings=recording.readings * recording.metadata["lsb_m_s2"], unit="m_s2")
