@@ -84,9 +84,8 @@ def show(
         from sim.effects.catalogue import essence, every_effect
 
         return essence((every_effect() | added_effects())[name])  # formula, parameters, rivals, experiment
-    raise unknown_name(
-        "name", name, [*(known for kind in _FILES for known in list_models(kind)), *catalogue("effects")]
-    )
+    files = (known for kind in _FILES for known in list_models(kind))
+    raise unknown_name("name", name, [*files, *catalogue("effects")])
 
 
 def _shown_file(name: str, max_memory: "MemorySize | None") -> str:
