@@ -34,7 +34,7 @@ def rig_drawing(world: World) -> Mapping[str, Sequence[Shape]]:
         in the hue of its chip. ``cube`` is missing where the chips are not on that cube, and so is the foot under it.
     """
     model = turntable_model(world)
-    chips = {chip.name: chip_colour(number) for number, chip in enumerate(world.array.chips)}
+    chips = {chip.name: chip_colour(index) for index, chip in enumerate(world.array.chips)}
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     shapes: dict[str, list[Shape]] = {"base": [], "table": [], "cube": []}

@@ -239,7 +239,7 @@ def _references(
         if world.earth_rate is not None:  # a gyro measures the rate against the stars
             rates = rates + earth_in_body(world.earth_rate, late if isinstance(late, BodyState) else body)
         gyro = rates @ world.gyro_matrix.T + rng.normal(size=body.omega.shape) * quality.gyro_noise_std
-        columns |= {f"gyro_{axis}_rad_s": gyro[:, place] for place, axis in enumerate("xyz")}
+        columns |= {f"gyro_{axis}_rad_s": gyro[:, index] for index, axis in enumerate("xyz")}
     return columns
 
 

@@ -82,7 +82,7 @@ def truth_columns(body: BodyState, gravity: float) -> Mapping[str, NDArray[np.fl
         ("velocity", "_m_s", body.velocity),
         ("position", "_m", body.position),
     ):
-        columns |= {f"truth_{quantity}_{axis}{unit}": values[:, place] for place, axis in enumerate("xyz")}
+        columns |= {f"truth_{quantity}_{axis}{unit}": values[:, index] for index, axis in enumerate("xyz")}
     return columns | {f"truth_q_{part}": quaternion[:, place] for place, part in enumerate("wxyz")}
 
 

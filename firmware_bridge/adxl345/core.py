@@ -160,8 +160,8 @@ class ChipCore:
         # Conversions that leave no trace: those that find a full FIFO, or those that newer ones push out.
         stored = min(due, _FIFO_DEPTH + 1)
         skip = 0 if filling else due - stored
-        for place in range(stored):
-            ahead = skip if place == 0 else 0
+        for index in range(stored):
+            ahead = skip if index == 0 else 0
             sample = self._conversion(ahead)
             self.next_conversion += (ahead + 1) * self._period
             self._store(sample, mode)

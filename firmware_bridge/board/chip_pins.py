@@ -64,13 +64,13 @@ class ChipPins(Peripheral):
         """Pass on the levels, and ask to be woken when one may change."""
         now = self.bus.now
         following = 1 << 62
-        for number, chip in enumerate(self._chips):
+        for index, chip in enumerate(self._chips):
             if chip.signalling:
                 for output, pins in ((1, INT1_PINS), (2, INT2_PINS)):
                     level = chip.interrupt_pin(output, now)
-                    if self._levels.get(pins[number]) != level:
-                        self._levels[pins[number]] = level
-                        self._drive(PORT, pins[number], level)
+                    if self._levels.get(pins[index]) != level:
+                        self._levels[pins[index]] = level
+                        self._drive(PORT, pins[index], level)
                 chip.signalling = chip.signals
                 if chip.signals:
                     following = min(following, chip.next_change)

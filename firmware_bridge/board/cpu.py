@@ -456,7 +456,7 @@ class Cpu:
 
     def _fault(self, kind: FaultKind, detail: str) -> BoardFault:
         """Describe where the processor stands."""
-        names = [f"r{number}" for number in range(13)] + ["sp", "lr", "pc", "xpsr", "msp", "psp"]
+        names = [f"r{index}" for index in range(13)] + ["sp", "lr", "pc", "xpsr", "msp", "psp"]
         registers = {
             name: int(self.uc.reg_read(getattr(arm, f"UC_ARM_REG_{name.upper()}"))) & 0xFFFFFFFF for name in names
         }

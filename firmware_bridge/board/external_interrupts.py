@@ -50,8 +50,8 @@ class ExternalInterrupts(Peripheral):
     def _update(self) -> None:
         """Set the flags of active levels, which can't be cleared while they last, and the interrupt lines."""
         self.flags |= self.selected & ~self.mode & ~(self.levels ^ self.polarity) & 0xF
-        for number in range(_COUNT - 1):
-            self.bus.nvic.set_line(_FIRST_IRQ + number, level=self.flags >> number & 1)
+        for index in range(_COUNT - 1):
+            self.bus.nvic.set_line(_FIRST_IRQ + index, level=self.flags >> index & 1)
         self.bus.gpio_interrupts.update_line()  # EINT3 shares its line with the pins of ports 0 and 2
 
     def read(self, offset: int, size: int) -> int:

@@ -52,7 +52,7 @@ class Gpdma(Peripheral):
             values = (channel.source, channel.destination, channel.link, channel.control, channel.config)
             place = (offset & 0x1F) >> 2
             return values[place] if place < len(values) else 0
-        enabled = sum(1 << number for number, channel in enumerate(self.channels) if channel.config & _ENABLE)
+        enabled = sum(1 << index for index, channel in enumerate(self.channels) if channel.config & _ENABLE)
         pending = self._pending()
         return {0x00: pending, 0x04: pending, 0x14: self.terminal, 0x1C: enabled, 0x30: self.config}.get(offset, 0)
 
@@ -101,9 +101,9 @@ class Gpdma(Peripheral):
 
     def event(self) -> None:
         """Move the units that are due."""
-        for number, channel in enumerate(self.channels):
+        for index, channel in enumerate(self.channels):
             if channel.due <= self.bus.now:
-                self._move(number, channel)
+                self._move(index, channel)
         self._plan()
 
     def _move(self, number: int, channel: _Channel) -> None:

@@ -61,15 +61,15 @@ class Timer(Peripheral):
         """Schedule the next match that does something."""
         self.due = NEVER
         if self.control == _ENABLE:
-            for number in range(self.matches):
-                if self.match_control >> 3 * number & 7:
-                    ahead = (self.match[number] - self.start_count) % _WRAP
+            for index in range(self.matches):
+                if self.match_control >> 3 * index & 7:
+                    ahead = (self.match[index] - self.start_count) % _WRAP
                     if ahead == 0 and after_match:
                         ahead = _WRAP
                     when = self.start + ahead * self.tick
                     if when < self.due:
                         self.due = when
-                        self.due_match = number
+                        self.due_match = index
         self.bus.schedule(self.slot, self.due)
 
     def event(self) -> None:
@@ -77,11 +77,11 @@ class Timer(Peripheral):
         reached = self.match[self.due_match]
         self.start, self.start_count = self.due, reached
         clear = False
-        for number in range(self.matches):
-            action = self.match_control >> 3 * number & 7
-            if action and self.match[number] == reached:
+        for index in range(self.matches):
+            action = self.match_control >> 3 * index & 7
+            if action and self.match[index] == reached:
                 if action & 1:
-                    self.interrupts |= self.flag(number)
+                    self.interrupts |= self.flag(index)
                 if action & 2:
                     clear = True
                 if action & 4:

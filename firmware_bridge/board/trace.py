@@ -141,8 +141,8 @@ def _identifiers() -> Iterator[str]:
     symbols = [chr(code) for code in range(33, 127)]
     length = 1
     while True:
-        for number in range(len(symbols) ** length):
-            name, rest = "", number
+        for index in range(len(symbols) ** length):
+            name, rest = "", index
             for _ in range(length):
                 name += symbols[rest % len(symbols)]
                 rest //= len(symbols)

@@ -225,7 +225,7 @@ def sample_at(rate_hz: int, code: int = RATE_CODE_AUTO) -> bytes:
 
 def asked_rate(commands: Sequence[bytes]) -> int:
     """Return the sample rate that some of these commands ask for, Hz; 0 if none does."""
-    rates = [struct.unpack_from("<H", one, 4)[0] for one in commands if one[2] == Command.SET_RATE]
+    rates = [struct.unpack_from("<H", command, 4)[0] for command in commands if command[2] == Command.SET_RATE]
     return int(rates[-1]) if rates else 0
 
 

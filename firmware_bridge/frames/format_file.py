@@ -166,7 +166,7 @@ def _temperature(spec: FormatFile, array: AccelerometerArray, source: str) -> Te
 def _packet(spec: Packet, source: str) -> tuple[StreamLayout, Collection[str], int]:
     """Return the layout of a packet, the names of its fields, and its number of counts."""
     order = "<" if spec.byte_order == "little" else ">"
-    names = [one.name for one in spec.fields]
+    names = [field.name for field in spec.fields]
     for name in ("time", "counts"):
         if names.count(name) != 1:
             raise InputError(f"{source}: [stream]: fields {', '.join(names)}: give one with name = {name!r}")
@@ -196,7 +196,7 @@ def _packet(spec: Packet, source: str) -> tuple[StreamLayout, Collection[str], i
             )
         bytes_of = np.array(one.value, dtype=_numpy_type(one.type, order)).tobytes()
         start = offsets[one.name]
-        signature += [(start + place, byte) for place, byte in enumerate(bytes_of)]
+        signature += [(start + index, byte) for index, byte in enumerate(bytes_of)]
     if not signature and spec.framing == "none":
         raise InputError(
             f"{source}: [stream]: nothing marks a packet; give a field a value (sync bytes), or framing cobs or slip"

@@ -65,7 +65,7 @@ class Status(enum.IntFlag):
     @property
     def missing_sensors(self) -> tuple[int, ...]:
         """Numbers 1…4 of the sensors that did not answer."""
-        return tuple(number + 1 for number in range(4) if self & (1 << number))
+        return tuple(index + 1 for index in range(4) if self & (1 << index))
 
 
 LPC1768_DTYPE = np.dtype(

@@ -102,9 +102,9 @@ def judge(
     """Compare readings without and under self-test, shapes (n, 3k) and (m, 3k), g, with the limits."""
     limits = LIMITS_G * _SUPPLY_SCALE[:, None] if at_3v3 else LIMITS_G
     rows = []
-    for place, channel in enumerate(channels):
-        least, greatest = sorted(float(limit) for limit in limits[place % 3])
-        off, on = off_g[:, place], on_g[:, place]
+    for index, channel in enumerate(channels):
+        least, greatest = sorted(float(limit) for limit in limits[index % 3])
+        off, on = off_g[:, index], on_g[:, index]
         off, on = off[np.isfinite(off)], on[np.isfinite(on)]
         if len(off) < 2 or len(on) < 2:
             rows.append(AxisSelfTest(channel, np.nan, least, greatest, np.nan, "missing"))

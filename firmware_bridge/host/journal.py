@@ -99,9 +99,9 @@ class Journal:
         missing = np.isnan(counts)
         whole = np.where(missing, 0, counts).astype(np.int32)
         self._is_narrow &= bool(np.abs(whole).max(initial=0) < 1 << 15)
-        for place in range(counts.shape[1]):
-            mask = missing[:, place]
-            columns.append(pa.array(whole[:, place], mask=mask if mask.any() else None))
+        for index in range(counts.shape[1]):
+            mask = missing[:, index]
+            columns.append(pa.array(whole[:, index], mask=mask if mask.any() else None))
         columns.append(pa.array(status))
         if self._has_temperature:
             warm = np.full(len(t_s), np.nan) if temperature_degC is None else temperature_degC

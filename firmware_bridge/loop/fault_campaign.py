@@ -228,7 +228,7 @@ def run_fault(
 ) -> FaultOutcome:
     """Run one fault of `FAULTS` and return its row."""
     chance = np.random.default_rng([seed, list(FAULTS).index(name)])
-    options = tuple(Adxl345Options(phase=0.25 * number) for number in range(4))
+    options = tuple(Adxl345Options(phase=0.25 * index) for index in range(4))
     with BoardProcess(physics, chips=options, fast=fast) as board:
         _settle(board)
         line = FAULTS[name](board, chance)
@@ -268,10 +268,10 @@ def run_campaign(
 ) -> FaultReport:
     """Run all faults; return the table."""
     rows = []
-    for number, name in enumerate(FAULTS):
+    for index, name in enumerate(FAULTS):
         rows.append(run_fault(name, physics=physics, seed=seed))
         if progress is not None:
-            progress((number + 1) / len(FAULTS))
+            progress((index + 1) / len(FAULTS))
     return FaultReport(tuple(rows))
 
 

@@ -157,8 +157,8 @@ def _parse(content: bytes, name: str) -> ElfImage:
         raise InputError(f"{name}: not an ARM image; build for cortex_m3")
     program_size, program_count, section_size, section_count = struct.unpack_from("<4H", content, 42)
     segments = []
-    for number in range(program_count):
-        kind, offset, _, address, length = struct.unpack_from("<5I", content, programs + number * program_size)
+    for index in range(program_count):
+        kind, offset, _, address, length = struct.unpack_from("<5I", content, programs + index * program_size)
         if kind == _LOAD and length:
             segments.append(Segment(address, content[offset : offset + length], offset))
     headers = [struct.unpack_from("<10I", content, sections + n * section_size) for n in range(section_count)]

@@ -88,7 +88,7 @@ class KlipperSource:
     @property
     def hint(self) -> str:
         """What to check when it can't be opened or sends nothing."""
-        silent = [name for place, name in enumerate(self._chips) if self._merger.newest_s(place) == -np.inf]
+        silent = [name for index, name in enumerate(self._chips) if self._merger.newest_s(index) == -np.inf]
         if self._heard_s and silent:
             return f"chip {silent[0]!r} sends nothing; try ACCELEROMETER_QUERY CHIP={silent[0]} on the printer"
         return "start Klipper with -a SOCKET (docs: API_Server.md) and give the path of that socket"

@@ -100,7 +100,7 @@ class CheckReport(Declared, TableResult):
     def to_columns(self) -> dict[str, NDArray[Any]]:
         """Return one row per finding: rule, severity, where, how often, what to do, and the document that says so."""
         texts = {
-            key: text_column(getattr(one, key) for one in self.findings)
+            key: text_column(getattr(finding, key) for finding in self.findings)
             for key in ("rule", "severity", "what", "symbol", "remedy", "source")
         }
         return {

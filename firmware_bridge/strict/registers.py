@@ -46,7 +46,7 @@ _WATCHDOG = _run("WDMOD WDTC WDFEED WDTV WDCLKSEL", 0x00)
 def _numbered(
     name: str, registers: Mapping[int, str], bases: Iterable[int]
 ) -> dict[int, tuple[str, Mapping[int, str]]]:
-    return {base: (f"{name}{number}", registers) for number, base in enumerate(bases)}
+    return {base: (f"{name}{index}", registers) for index, base in enumerate(bases)}
 
 
 _BLOCKS: dict[int, tuple[str, Mapping[int, str]]] = {

@@ -93,7 +93,7 @@ def _identity(sent: bytes) -> Identity | None:
     decoder = SampleDecoder()
     decoder.feed(sent)
     messages = [parse_message(packet) for packet in decoder.messages]
-    return next((one for one in messages if isinstance(one, Identity)), None)
+    return next((message for message in messages if isinstance(message, Identity)), None)
 
 
 def _commands(identity: Identity, *, keeps_speed: bool) -> Iterator[tuple[bytes, float]]:
@@ -111,8 +111,8 @@ def _commands(identity: Identity, *, keeps_speed: bool) -> Iterator[tuple[bytes,
     if not keeps_speed:
         yield encode_command(Command.SET_BAUD, FAST_BAUD), _SETTLE_S
     yield set_rate(rate_hz), _SETTLE_S
-    for number, command in enumerate([start] * _STARTS + 2 * [*set_up, stop, identify, start]):
-        yield command, _SET_UP_S * (command in set_up) + (_PERIODS + number * _GOLDEN % 1.0) / rate_hz
+    for index, command in enumerate([start] * _STARTS + 2 * [*set_up, stop, identify, start]):
+        yield command, _SET_UP_S * (command in set_up) + (_PERIODS + index * _GOLDEN % 1.0) / rate_hz
 
 
 def _board(image: ElfImage, request: dict[str, Any], stuck: str | None = None) -> StrictBoard:
@@ -175,7 +175,7 @@ def answer(request: dict[str, Any]) -> dict[str, Any]:
         "sent": [len(uart.take_sent()[0]) for uart in board.uarts],
         "baud": [uart.baud for uart in board.uarts],
         "character": [_character(uart.line_control) for uart in board.uarts],
-        "stack_bytes": max((one.used for one in stacks if one.used is not None), default=None),
+        "stack_bytes": max((stack.used for stack in stacks if stack.used is not None), default=None),
         "stack_room": stacks[0].room,
         "started_at": board.started_at,
         "findings": [asdict(finding) for finding in findings],

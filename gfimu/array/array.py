@@ -150,7 +150,7 @@ class AccelerometerArray(TableResult):
             "channel": text_column(self.channels),
             "chip": text_column(chip.name for chip in chips),
             "part": text_column(chip.part for chip in chips),
-            **{f"position_{axis}_m": self.positions[:, place] for place, axis in enumerate("xyz")},
+            **{f"position_{axis}_m": self.positions[:, index] for index, axis in enumerate("xyz")},
             **{f"axis_{axis}": self.axes[:, place] for place, axis in enumerate("xyz")},
         }
 

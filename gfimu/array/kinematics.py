@@ -398,13 +398,13 @@ def _motion_of_holed_rows(
     motion = np.full((len(rows), 6), np.nan)
     scale = np.array([array.length_unit] * 3 + [1.0] * 3)
     patterns, membership = np.unique(~np.isnan(rows), axis=0, return_inverse=True)
-    for number, present in enumerate(patterns):
+    for index, present in enumerate(patterns):
         regression = array.regression_matrix[present]
         if np.linalg.matrix_rank(regression / scale, tol=RANK_TOLERANCE) < 6:
             continue
         inverse = _left_inverse(regression, array.length_unit)
         leakage = _without_rounding(inverse @ array.centripetal_matrix[present], array.length_unit)
-        members = membership.reshape(-1) == number
+        members = membership.reshape(-1) == index
         if rates is not None:
             motion[members] = rows[members][:, present] @ inverse.T - omega_products(rates[members]) @ leakage.T
         else:

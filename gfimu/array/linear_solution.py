@@ -89,9 +89,9 @@ class LinearSolution:
             return self.motion
         products = omega_products(omega)  # (n, 6)
         result = self.motion.copy()
-        for number, leakage in enumerate(self.leakage):
+        for index, leakage in enumerate(self.leakage):
             if leakage.any():
-                rows = self.pattern == number
+                rows = self.pattern == index
                 result[rows] -= products[rows] @ leakage.T
         return result
 
@@ -202,16 +202,16 @@ def _patterns(
     """Yield the samples of each pattern of missing channels, and the channels that are present."""
     holed = np.flatnonzero(~complete)
     patterns, membership = np.unique(np.isfinite(readings[holed]), axis=0, return_inverse=True)
-    for number, present in enumerate(patterns):
-        yield holed[membership.reshape(-1) == number], present
+    for index, present in enumerate(patterns):
+        yield holed[membership.reshape(-1) == index], present
 
 
 def _with_channels(array: AccelerometerArray, present: NDArray[np.bool_]) -> AccelerometerArray:
     """Return the array without its missing channels; raises `GeometryError` if none is left."""
     chips = [
-        replace(chip, axes=chip.axes[present[array.chip_of_channel == number]])
-        for number, chip in enumerate(array.chips)
-        if present[array.chip_of_channel == number].any()
+        replace(chip, axes=chip.axes[present[array.chip_of_channel == index]])
+        for index, chip in enumerate(array.chips)
+        if present[array.chip_of_channel == index].any()
     ]
     if not chips:
         raise GeometryError(f"array {array.name!r}: no channel is present")

@@ -233,9 +233,9 @@ def sites_of_csv(path: str | Path) -> Sites:
     check_input(Path(path))
     with Path(path).open(encoding="utf-8-sig", newline="") as stream:
         reader = csv.DictReader(line for line in stream if not line.startswith("#"))
-        names = [one.strip() for one in reader.fieldnames or []]
+        names = [fieldname.strip() for fieldname in reader.fieldnames or []]
         columns = ["x_m", "y_m", "z_m"]
-        missing = [one for one in columns if one not in names]
+        missing = [column for column in columns if column not in names]
         if missing:
             raise InputError(f"{path}: no column {missing[0]}; the first line must name x_m, y_m, z_m")
         directed = "axis_x" in names

@@ -202,7 +202,7 @@ def _weighed(
     goals = (first.goal, second.goal)
     found: list[FrontPoint] = []
     last: tuple[Design, ...] = ()
-    for number, weight in enumerate(_WEIGHTS):
+    for index, weight in enumerate(_WEIGHTS):
         share = min(max(weight, _TIE), 1.0 - _TIE)
         compromise = Goal(first.sought(1.0 - share) + second.sought(share))
         end = best_design(
@@ -212,7 +212,7 @@ def _weighed(
             starts=starts,
             kicks=_KICKS,
             also=last,
-            report=_part(report, number, len(_WEIGHTS)),
+            report=_part(report, index, len(_WEIGHTS)),
         )
         last = (end.design,)
         values = (
@@ -235,9 +235,9 @@ def _stepped(
     report: Callable[[float], None] | None,
 ) -> list[FrontPoint]:
     found = []
-    for number, (step, problem) in enumerate(steps):
+    for index, (step, problem) in enumerate(steps):
         wanted = objective(name, problem, conditions)
-        end = best_design(problem, Goal(wanted.sought()), rng, starts=starts, report=_part(report, number, len(steps)))
+        end = best_design(problem, Goal(wanted.sought()), rng, starts=starts, report=_part(report, index, len(steps)))
         value = math.exp(log_figure(problem, wanted.goal, end.design))
         text = f"least {wanted.meaning} found for {problem.n_chips} chips in {problem.volume.name}"
         array = problem.array(end.design, "front", conditions.part, text)

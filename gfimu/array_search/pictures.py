@@ -105,10 +105,10 @@ def _wires(shape: Shape) -> list[NDArray[np.float64]]:
     if shape.kind == "box":
         corners = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)])
         return [
-            centre + np.array([one, other]) * half
-            for a, one in enumerate(corners)
+            centre + np.array([corner, other]) * half
+            for a, corner in enumerate(corners)
             for other in corners[a + 1 :]
-            if np.abs(one - other).sum() == 2
+            if np.abs(corner - other).sum() == 2
         ]
     ring = np.column_stack([np.cos(turn), np.sin(turn), np.zeros_like(turn)])
     if shape.kind == "sphere":
@@ -131,9 +131,9 @@ def _draw_zone(
     if np.linalg.matrix_rank(points - points[0]) == 3:
         style: dict[str, Any] = {"color": css(BEFORE_ON_PAPER), "alpha": 0.18, "linewidth": 0.0}
         axes.plot_trisurf(*points.T, triangles=ConvexHull(points).simplices, shade=False, **style)
-    for number, line in enumerate(_wires(zone)):
+    for index, line in enumerate(_wires(zone)):
         within = np.clip(line * _MM, *shown)
-        axes.plot(*within.T, color=css(BEFORE_ON_PAPER), lw=0.7, label=label if number == 0 else None)
+        axes.plot(*within.T, color=css(BEFORE_ON_PAPER), lw=0.7, label=label if index == 0 else None)
 
 
 def _save(figure: Figure, path: str | Path) -> None:

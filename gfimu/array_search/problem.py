@@ -51,7 +51,7 @@ class Sites:
     def __post_init__(self) -> None:
         if self.positions.ndim != 2 or self.positions.shape[1:] != (3,) or not np.isfinite(self.positions).all():
             raise InputError(f"{self.name}: candidate sites must be rows of three finite numbers, m")
-        if not all(np.isfinite(one).all() for one in self.axes):
+        if not all(np.isfinite(axis).all() for axis in self.axes):
             raise InputError(f"{self.name}: an axis of a candidate site is not finite")
 
 
@@ -238,7 +238,7 @@ class Problem:
                 _combinations(self.volume.axes[one], self.axes_per_chip, f"{self.volume.name}: site {one + 1}")
                 for one in free
             ]
-            site = np.repeat(free, [len(one) for one in frames])
+            site = np.repeat(free, [len(frame) for frame in frames])
             return Candidates(places[site] / self.unit, np.concatenate(frames), site)
         shape = self.volume
         points = np.vstack(
@@ -297,8 +297,8 @@ class Problem:
     def array(self, design: Design, name: str, part: str, description: str) -> AccelerometerArray:
         """Return a design as an array."""
         chips = tuple(
-            Chip(f"a{number + 1}", position * self.unit, axes, part)
-            for number, (position, axes) in enumerate(zip(design.positions, design.axes, strict=True))
+            Chip(f"a{index + 1}", position * self.unit, axes, part)
+            for index, (position, axes) in enumerate(zip(design.positions, design.axes, strict=True))
         )
         return AccelerometerArray(name, chips, self.length_unit_m or self.unit, description)
 

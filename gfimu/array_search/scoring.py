@@ -176,7 +176,7 @@ def score_panels(scores: Sequence[Score]) -> list[Panel]:
         return np.where(np.isfinite(numbers), numbers, np.nan)
 
     def by_array(values: Callable[[Score], NDArray[np.float64]]) -> tuple[Series, ...]:
-        return tuple(Series(score.name, finite(values(score)), chip=place) for place, score in enumerate(scores))
+        return tuple(Series(score.name, finite(values(score)), chip=index) for index, score in enumerate(scores))
 
     sigma = by_array(lambda score: np.concatenate([score.sigma_alpha, score.sigma_p]))
     merit = (

@@ -274,8 +274,8 @@ def best_design(
     ends: list[tuple[float, Design]] = []
     blind: list[tuple[float, Design]] = []
     made = 0
-    for number in range(starts + len(also)):
-        given = also[number] if number < len(also) else None
+    for index in range(starts + len(also)):
+        given = also[index] if index < len(also) else None
         value, design = _one_start(problem, goal, given, rng, kicks)
         made += 1
         if feasible(problem, design) and not (problem.non_recursive and leaks(design)):

@@ -240,8 +240,8 @@ def _learned_ratio(data: _Data, state: _State, done: Callable[[float], object]) 
     """
     states: list[_State] = []
     best, least = _RATIOS[0], np.inf
-    for number, ratio in enumerate(_RATIOS):
-        done(number / (len(_RATIOS) + 1))  # settling counts as one more
+    for index, ratio in enumerate(_RATIOS):
+        done(index / (len(_RATIOS) + 1))  # settling counts as one more
         step = _settled(data, state, ratio, enough=0.3, iterations=4)
         state = step.state
         states.append(state)

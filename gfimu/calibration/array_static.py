@@ -163,7 +163,7 @@ def apparent_alpha(array: AccelerometerArray, body: Floats) -> Floats:
         Specific force of each chip in body axes.
     """
     readings = np.concatenate(
-        [body[:, number] @ chip.axes.T for number, chip in enumerate(array.chips)], axis=1
+        [body[:, index] @ chip.axes.T for index, chip in enumerate(array.chips)], axis=1
     )  # (p, c)
     return np.asarray((readings @ np.linalg.pinv(array.regression_matrix).T)[:, :3], dtype=np.float64)
 
@@ -181,11 +181,11 @@ def _triads(array: AccelerometerArray) -> Floats:
 def _start(means: Floats, axes: Floats, array: AccelerometerArray, gravity: float) -> Floats:
     """Take starting values from the sphere of each chip; refuse a chip not mounted as drawn."""
     parameters, directions = [], []
-    for number in range(len(axes)):
-        centre, radius = fit_sphere(means[:, 3 * number : 3 * number + 3])
+    for index in range(len(axes)):
+        centre, radius = fit_sphere(means[:, 3 * index : 3 * index + 3])
         scale = radius / gravity
         parameters.append(np.concatenate([(scale * np.eye(3)).ravel(), centre]))
-        arrows = (means[:, 3 * number : 3 * number + 3] - centre) @ axes[number]
+        arrows = (means[:, 3 * index : 3 * index + 3] - centre) @ axes[index]
         directions.append(arrows / np.linalg.norm(arrows, axis=1, keepdims=True))
     common = np.median(directions, axis=0)
     for chip, own in zip(array.chips, directions, strict=True):
@@ -202,11 +202,11 @@ def _start(means: Floats, axes: Floats, array: AccelerometerArray, gravity: floa
 def _rotation_gauge(axes: Floats) -> Floats:
     """Rows of the three conditions Σ_i antisymmetric part of A_iᵀ M_i A_i = 0, shape (3, u)."""
     rows = np.zeros((3, 12 * len(axes)))
-    for number, a in enumerate(axes):
+    for index, a in enumerate(axes):
         for row, (p, q) in enumerate(((2, 1), (0, 2), (1, 0))):
             # (A^T M A)_pq − (A^T M A)_qp, linear in the elements of M.
             weight = np.outer(a[:, p], a[:, q]) - np.outer(a[:, q], a[:, p])
-            rows[row, 12 * number : 12 * number + 9] = weight.ravel()
+            rows[row, 12 * index : 12 * index + 9] = weight.ravel()
     return rows
 
 
@@ -264,8 +264,8 @@ def _common_rotations(parameters: Floats, axes: Floats) -> Floats:
     for direction in np.eye(3):
         turn = np.cross(np.eye(3), direction)  # [δ×] up to sign
         blocks = []
-        for number, a in enumerate(axes):
-            m = parameters[12 * number : 12 * number + 9].reshape(3, 3)
+        for index, a in enumerate(axes):
+            m = parameters[12 * index : 12 * index + 9].reshape(3, 3)
             blocks.append(np.concatenate([(m @ a @ turn @ a.T).ravel(), np.zeros(3)]))
         columns.append(np.concatenate([*blocks, rest]))
     return np.asarray(np.linalg.qr(np.column_stack(columns))[0], dtype=np.float64)
@@ -274,7 +274,7 @@ def _common_rotations(parameters: Floats, axes: Floats) -> Floats:
 def body_specific_force(result: Calibration, array: AccelerometerArray, means: Floats) -> Floats:
     """Correct readings (p, c) to the specific force of each chip in body axes, shape (p, k, 3), m/s²."""
     parts = [
-        result.models[chip.name].correct(means[:, 3 * number : 3 * number + 3]) @ chip.axes
-        for number, chip in enumerate(array.chips)
+        result.models[chip.name].correct(means[:, 3 * index : 3 * index + 3]) @ chip.axes
+        for index, chip in enumerate(array.chips)
     ]
     return np.stack(parts, axis=1)

@@ -104,10 +104,10 @@ def _parameter_variance(
     """Return the variance of |a| (p, k) by the covariance of the parameters, (m/s²)²."""
     std = np.sqrt(np.maximum(np.diag(calibration.covariance), 0.0))
     slopes = np.zeros((len(std), *off.shape))
-    for number, one in enumerate(std):
+    for index, one in enumerate(std):
         if one > 0.0:
             step = np.zeros(len(std))
-            step[number] = _STEP * one
+            step[index] = _STEP * one
             moved = replace(calibration, values=calibration.values + step)
-            slopes[number] = (_off(moved, recording, rest) - off) / step[number]
+            slopes[index] = (_off(moved, recording, rest) - off) / step[index]
     return np.asarray(np.einsum("ipk,ij,jpk->pk", slopes, calibration.covariance, slopes))

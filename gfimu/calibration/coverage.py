@@ -90,13 +90,13 @@ def distinct_poses(directions: Floats) -> list[list[int]]:
     """Group poses that are within 8° of the first of their group; one list of pose numbers per distinct pose."""
     same = (directions @ directions.T > np.cos(np.deg2rad(_SAME_POSE_DEG))).tolist()
     groups: list[list[int]] = []
-    for number, like in enumerate(same):
+    for index, like in enumerate(same):
         for group in groups:
             if like[group[0]]:
-                group.append(number)
+                group.append(index)
                 break
         else:
-            groups.append([number])
+            groups.append([index])
     return groups
 
 

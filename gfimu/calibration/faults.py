@@ -71,11 +71,11 @@ def check_readings(recording: Recording, rest: Rest) -> tuple[str, ...]:
     noisy = np.median([np.nanstd(part, axis=0) for part in parts], axis=0) > 0.0
     top, bottom = np.nanmax(recording.readings, axis=0), np.nanmin(recording.readings, axis=0)
     texts: list[str] = []
-    for number, part in enumerate(parts):
+    for index, part in enumerate(parts):
         at_limit = np.maximum(np.mean(part == top, axis=0), np.mean(part == bottom, axis=0))
         texts.extend(
-            f"channel {recording.channels[channel]} is saturated in pose {number + 1} "
-            f"({recording.t_s[rest.start[number]]:.1f} s): {at_limit[channel]:.0%} of its samples are at its limit; "
+            f"channel {recording.channels[channel]} is saturated in pose {index + 1} "
+            f"({recording.t_s[rest.start[index]]:.1f} s): {at_limit[channel]:.0%} of its samples are at its limit; "
             "choose a larger range"
             for channel in np.flatnonzero(noisy & (at_limit > _SATURATED_SHARE) & (len(part) > 20))
             if at_limit[channel] > 3.0 * _typical_limit_share(recording.readings[:, channel], part[:, channel])
@@ -94,13 +94,13 @@ def moved_poses(recording: Recording, rest: Rest) -> list[int]:
     scale = float(np.max(np.ptp([np.nanmean(part, axis=0) for part in parts], axis=0)))
     noise = np.sqrt(np.median([np.nanvar(part, axis=0) for part in parts], axis=0))
     moved = []
-    for number, part in enumerate(parts):
+    for index, part in enumerate(parts):
         third = len(part) // 3
         if third < 3:
             continue
         step = np.abs(np.nanmean(part[-third:], axis=0) - np.nanmean(part[:third], axis=0))
         if np.any((step > _MOVED_SIGMA * noise * np.sqrt(2.0 / third)) & (step > _MOVED_SHARE * scale)):
-            moved.append(number)
+            moved.append(index)
     return moved
 
 

@@ -230,7 +230,7 @@ def denoised_samples(
 def _details(details: list[Floats], threshold: str, samples: int) -> list[Floats]:
     """Return the details (k_i, c) of a pose after thresholding, the finest last."""
     if threshold == "none":
-        return [np.zeros_like(one) for one in details]
+        return [np.zeros_like(detail) for detail in details]
     noise = np.median(np.abs(details[-1]), axis=0) / _MEDIAN_OF_NORMAL  # (c,)
     limit = noise * np.sqrt(2.0 * np.log(samples))
     size = [np.maximum(np.abs(one), np.finfo(float).tiny) for one in details]

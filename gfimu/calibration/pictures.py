@@ -111,7 +111,7 @@ def _correlation(axes: Axes, calibration: Calibration) -> None:
     axes.figure.colorbar(image, ax=axes, shrink=0.8, label="correlation")
     axes.set_title("correlation of the parameters", fontsize=10)
     names, chips = calibration.names, [name.rpartition("_")[0].rpartition("_")[0] for name in calibration.names]
-    starts = [place for place in range(len(names)) if place == 0 or chips[place] != chips[place - 1]]
+    starts = [index for index in range(len(names)) if index == 0 or chips[index] != chips[index - 1]]
     several = len(calibration.chips) > 1
     colours = {chip: css(chip_colour(number, on_paper=True)) for number, chip in enumerate(calibration.chips)}
     if len(names) <= _MOST_NAMED:
@@ -160,8 +160,8 @@ def _magnitudes(figure: Figure, calibration: Calibration, recording: Recording, 
     for panel, (title, readings, colour) in zip(panels, shown, strict=True):
         off = np.linalg.norm(rest_means(readings, calibration, rest), axis=2) - calibration.gravity  # (p, k)
         rms = float(np.sqrt(np.nanmean(off**2)))
-        for number, (chip, values) in enumerate(zip(calibration.chips, off.T, strict=True)):
-            hue = css(chip_colour(number, on_paper=True))
+        for index, (chip, values) in enumerate(zip(calibration.chips, off.T, strict=True)):
+            hue = css(chip_colour(index, on_paper=True))
             panel.plot(poses, values, "o", color=hue, markersize=4.5, label=chip)
         panel.axhspan(-rms, rms, color=colour, alpha=0.15, linewidth=0)
         panel.axhline(0.0, color=css(INK), linewidth=0.5)

@@ -119,14 +119,14 @@ def find_plateaus(
     rest = detect_rest(seen, threshold=threshold, min_duration_s=min_duration_s)
     complete = np.asarray(np.isfinite(readings).all(axis=1))
     rows = [np.arange(start, stop)[complete[start:stop]] for start, stop in zip(rest.start, rest.stop, strict=True)]
-    rows = [one for one in rows if len(one) > 1]
+    rows = [row for row in rows if len(row) > 1]
     if not rows:
         raise InputError(
             f"no stretch of constant rate of {min_duration_s:g} s; hold each rate longer, or raise --rest-threshold "
             f"(now {rest.threshold:.3g} rad²/s²)"
         )
     stretches = [readings[one] for one in rows]
-    counts = np.array([len(one) for one in stretches])
+    counts = np.array([len(stretch) for stretch in stretches])
     means = np.array([one.mean(axis=0) for one in stretches])
     noise = regular_covariance(np.array([np.cov(one, rowvar=False) for one in stretches]), seen.unit)
     noise *= mean_variance_factor(stretches) / counts[:, None, None]  # of the means
@@ -176,7 +176,7 @@ def rate_table_gyro(
     if not 0.0 <= levelling_std_rad < math.inf:
         raise InputError(f"--levelling-std is {levelling_std_rad:g} rad; it must be zero or above")
     vertical = 0.0 if latitude_deg is None else EARTH_RATE * math.sin(math.radians(latitude_deg))
-    axes = np.concatenate([np.tile(one.axis, (len(one.rate), 1)) for one in mountings])  # (p, 3)
+    axes = np.concatenate([np.tile(mounting.axis, (len(mounting.rate), 1)) for mounting in mountings])  # (p, 3)
     true = (np.concatenate([one.rate for one in mountings]) + vertical)[:, None] * axes
     readings = np.concatenate([one.means for one in mountings])
     design = forward_design(true, free_elements(_GAUGE)).reshape(-1, 12)  # (3p, 12)
@@ -269,7 +269,7 @@ def _covariance(
     mountings: Sequence[Plateaus], sensitivity: Floats, latitude_deg: float | None, levelling_std_rad: float
 ) -> Floats:
     """Covariance of all means, (3p, 3p): noise, and what is uncertain of the true inputs, through M."""
-    count = sum(len(one.rate) for one in mountings)
+    count = sum(len(mounting.rate) for mounting in mountings)
     matrix = np.zeros((count, 3, count, 3))
     sources = []  # of one number each: what it moves in the true input of every plateau, (p, 3)
     spin_up = np.zeros((count, 3))

@@ -185,7 +185,7 @@ class Calibration(Declared, PlottedResult):
         """One panel per kind of parameter, what it deviates from an ideal triad where that is 1 or 0."""
         panels = []
         for title, belongs in KINDS.items():
-            places = [place for place, name in enumerate(self.names) if belongs(name)]
+            places = [index for index, name in enumerate(self.names) if belongs(name)]
             if not places:
                 continue
             ideal = 1.0 if title == "sensitivity" and self.unit != "lsb" else 0.0

@@ -189,8 +189,7 @@ def estimate(
     if array is not None and calibration is None:
         warn_of_other_array(run.metadata, geometry, "the recording", whose="the given")
     run = reference_on_rows(run)
-    # The inclination is that of --axis: an array's own axis stands as its file says.
-    about = replace(as_known_axis(axis), inclination_rad=None).of(geometry)
+    about = as_known_axis(axis).of(geometry)
     start = None if unknown_start else omega0
     if about is None:
         _require_all_motions(run, geometry)

@@ -80,7 +80,7 @@ def _from_options(
     inclination_rad: Annotated[
         float | None,
         Option(
-            "Angle between --axis and the vertical, rad; else from the data, or 0 (a free hub: π/2) where there are "
+            "Angle between the axis and the vertical, rad; else from the data, or 0 (a free hub: π/2) where there are "
             "none.",
             "RAD",
         ),

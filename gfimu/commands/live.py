@@ -15,7 +15,6 @@ gfimu live --from socket://pi:4000 --array wheel.toml --axis z --hub free --unkn
 
 import sys
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -125,8 +124,7 @@ def live(
     if not isinstance(rate, int | float) or not _RATES[0] <= rate <= _RATES[1]:
         raise InputError(f"--rate {rate}: must be positive, {_RATES[0]:g} to {_RATES[1]:g} Hz")
     lines = _examined(lines, geometry, rate, force=force)
-    # The inclination is that of --axis: an array's own axis stands as its file says.
-    about = replace(as_known_axis(axis), inclination_rad=None).of(geometry)
+    about = as_known_axis(axis).of(geometry)
     if about is not None:
         from gfimu.rate.axis.live import axis_stream
 

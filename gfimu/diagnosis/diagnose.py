@@ -70,7 +70,7 @@ def diagnose(
     if not recordings:
         raise InputError("no recording to diagnose; give at least one")
     progress = report or (lambda share, text: None)
-    labels = list(names) if names is not None else [f"run {number + 1}" for number in range(len(recordings))]
+    labels = list(names) if names is not None else [f"run {index + 1}" for index in range(len(recordings))]
     held_labels = [f"held-out run {number + 1}" for number in range(len(held_out))]
     for recording, label in zip((*recordings, *held_out), (*labels, *held_labels), strict=True):
         warn_of_other_array(recording.metadata, model.array, label)
@@ -108,7 +108,7 @@ def prepare(
 ) -> PreparedRuns:
     """Read recordings of a table or of a free body and find the faults of their samples."""
     if model.drive_source == "gyro":
-        recordings = [with_axis_gyro(reference_on_rows(one), model.array) for one in recordings]
+        recordings = [with_axis_gyro(reference_on_rows(recording), model.array) for recording in recordings]
         return prepare_bodies(recordings, model, names, spike_share=policy.body_spike_share)
     return PreparedRuns.build(recordings, model, names, predicted_by_reference, force=force)
 

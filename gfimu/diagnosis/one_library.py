@@ -112,7 +112,7 @@ class LibraryDiagnosis:
                 self._prepared, understanding, left, Gain(), policy, withdrawn=withdrawn, refuted=refuted, unknown=True
             )
         fitted = understanding.explanation.best.names
-        inferred = [one for one in found.causes if one.effect in fitted]
+        inferred = [cause for cause in found.causes if cause.effect in fitted]
         refuted = judge(gain, found.residual, inferred, policy, found.unexplained).why
         if refuted:
             return self._described(understanding, left, withdrawn, refuted)

@@ -140,7 +140,7 @@ class Estimate(PlottedResult):
         for attribute, names in _VECTOR_COLUMNS.items():
             values = getattr(self, attribute)
             if values is not None:
-                columns |= {name: values[:, place] for place, name in enumerate(names)}
+                columns |= {name: values[:, index] for index, name in enumerate(names)}
         health = {f"{_HEALTH}{name}": values for name, values in (self.health or {}).items()}
         sign = {} if self.sign_probability is None else {_SIGN: self.sign_probability}
         return columns | sign | {"angle_rad": self.angle} | health

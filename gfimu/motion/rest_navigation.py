@@ -67,9 +67,9 @@ def navigate_with_rest(
         )
     edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(np.int8)))
     stretches = list(zip(edges[::2], edges[1::2], strict=True))
-    for number, (start, stop) in enumerate(stretches):
+    for index, (start, stop) in enumerate(stretches):
         _level_from(force, attitude, int(start), int(stop), gravity)
-        until = stretches[number + 1][0] if number + 1 < len(stretches) else len(times)
+        until = stretches[index + 1][0] if index + 1 < len(stretches) else len(times)
         seen = np.isfinite(force[start:stop]).all(axis=1)
         if seen.any():
             up = to_rotation(attitude[start:stop][seen]).inv().apply([0.0, 0.0, gravity])

@@ -125,7 +125,7 @@ def judge_consistency(
     length = max(1, round(_WINDOW_S / period))
     count = len(nis) // length
     whole = slice(0, len(nis))
-    parts = [whole] + [slice(number * length, (number + 1) * length) for number in range(count)]
+    parts = [whole] + [slice(index * length, (index + 1) * length) for index in range(count)]
     sums = np.array([nis[part].sum() for part in parts])
     freedom = np.array([dof[part].sum() for part in parts])
     # One test for the run and one for the worst of its seconds, so those share the probability.
@@ -211,8 +211,8 @@ def slow_error_signatures(
     except InputError:
         return np.zeros_like(moved)
     sides = np.zeros((2, *moved.shape))
-    for number in range(len(array.chips)):
-        mine = np.flatnonzero(array.chip_of_channel == number)
+    for index in range(len(array.chips)):
+        mine = np.flatnonzero(array.chip_of_channel == index)
         for side in range(min(2, len(mine) - 1)):
             sides[side][:, mine] = moved[:, np.roll(mine, -1 - side)]
         if len(mine) < 3:  # the chip does not read this side; it moves as much as all channels do on average

@@ -122,11 +122,11 @@ def run_filter(
     rest = live.settings.rest
     window = rest.window(live.period) if rest else 0
     tracks = []
-    for number, first in enumerate(pushed):
+    for index, first in enumerate(pushed):
         # Once decided within the block, only the winner goes on.
         if len(last) == len(pushed):
-            tracks.append(join([first, last[number]]))
-        elif number == live.winner:
+            tracks.append(join([first, last[index]]))
+        elif index == live.winner:
             tracks.append(join([first, last[0]]))
     if live.sign.state == "decided" and len(tracks) == 2:  # decided by the very last samples
         tracks = [tracks[live.winner]]

@@ -230,15 +230,15 @@ class LiveRateFilter:
                        columns.manoeuvre):  # fmt: skip
             column[:] = 0
         complete = np.all(np.abs(rows) < self.errors.limits, axis=1)
-        for place in range(len(t)):
-            if complete[place]:
-                found, clear = self._initial.find(rows[place])
+        for index in range(len(t)):
+            if complete[index]:
+                found, clear = self._initial.find(rows[index])
                 if clear:
                     self._begin(found)
-                    self.started_at_s = float(t[place])
-                    return FilterOutput(t, columns).rows(slice(0, place)), place
+                    self.started_at_s = float(t[index])
+                    return FilterOutput(t, columns).rows(slice(0, index)), index
                 self._limit = self._initial.limit(found)
-            columns.covariance[place, :3] = self._limit**2
+            columns.covariance[index, :3] = self._limit**2
         return FilterOutput(t, columns), len(t)
 
     def _begin(self, found: NDArray[np.float64]) -> None:

@@ -80,8 +80,8 @@ def keep_rest(state):  # type: ignore[no-untyped-def]
         state.past_x[place, r] = state.x[r]
         for q in range(len(state.x)):
             state.past_covariance[place, r, q] = state.covariance[r, q]
-    for number in range(len(state.scalars)):
-        state.past_scalars[place, number] = state.scalars[number]
+    for index in range(len(state.scalars)):
+        state.past_scalars[place, index] = state.scalars[index]
     state.past_samples[place] = state.counts[SAMPLES]
     state.counts[PAST] += 1
 

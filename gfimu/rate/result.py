@@ -193,7 +193,7 @@ class RateEstimate(PlottedResult):
     def to_columns(self) -> dict[str, NDArray[Any]]:
         """Return the columns of a table, by name with unit: time, ω and its standard deviation, statistics, rest."""
         columns: dict[str, NDArray[Any]] = {"t_s": self.t_s}
-        columns |= {f"omega_{axis}_rad_s": self.omega[:, place] for place, axis in enumerate("xyz")}
+        columns |= {f"omega_{axis}_rad_s": self.omega[:, index] for index, axis in enumerate("xyz")}
         columns |= {f"omega_{axis}_std_rad_s": self.std[:, place] for place, axis in enumerate("xyz")}
         columns |= {"nis": self.nis, "nis_dof": self.nis_dof, "rest": self.rest}
         further = {"noise_scale": self.scale, "omega_sign_probability": self.sign_probability}

@@ -23,13 +23,13 @@ def without_clipped(recording: Recording, array: AccelerometerArray) -> tuple[Re
     readings, found = recording.for_array(array), []
     cleaned = readings
     noisy = noisy_channels(recording, array)  # a computed channel without noise may hold a level exactly
-    for place, name in enumerate(array.channels):
-        if not noisy[place]:
+    for index, name in enumerate(array.channels):
+        if not noisy[index]:
             continue
-        for rail in rails_of(readings[:, place]):
+        for rail in rails_of(readings[:, index]):
             if cleaned is readings:
                 cleaned = readings.copy()
-            cleaned[rail.on, place] = np.nan
+            cleaned[rail.on, index] = np.nan
             text = (
                 f"channel {name} reads its rail ({rail.level:.4g} m/s²) in {int(rail.on.sum())} samples, "
                 "which are left out; set a wider range"

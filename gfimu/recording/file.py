@@ -103,7 +103,7 @@ def read_recording_file(
         rows = slice(filled, filled + len(times))
         _check_times(table, times, filled, time[filled - 1] if filled else -np.inf)
         time[rows] = times
-        targets = [readings[rows, place] for place in range(len(channels))]
+        targets = [readings[rows, index] for index in range(len(channels))]
         targets += [reference[column.name][rows] for column in references]
         for column, numbers, target in zip((*channels, *references), values, targets, strict=True):
             with np.errstate(over="ignore"):  # what becomes infinite is left out

@@ -114,7 +114,7 @@ def mapped_recording(
         raise InputError(f"map {chosen.name!r} has references only; a recording needs [channels]")
     if isinstance(source, str | Path | list | tuple):
         paths = [source] if isinstance(source, str | Path) else source
-        files = [read_foreign(one, chosen.format, chosen.text) for one in paths]
+        files = [read_foreign(path, chosen.format, chosen.text) for path in paths]
     else:
         files = [table_file(source)]
     whole = combined_file(files, chosen)
@@ -123,7 +123,7 @@ def mapped_recording(
     merged = _between(merged_piece(pieces), chosen)
     for note in merged.times.notes:
         warnings.warn(note, RecordingWarning, stacklevel=2)
-    return _recording(merged, chosen, geometry, [one.source for one in files])
+    return _recording(merged, chosen, geometry, [file.source for file in files])
 
 
 def mapped_reference(
@@ -181,7 +181,7 @@ def _recording(piece: Piece, chosen: ColumnMap, array: AccelerometerArray | None
     columns |= dict(piece.reference)
     for name, values in piece.other.items():
         columns[f"{UNMAPPED}{'_'.join(name.split())}"] = values
-    metadata: dict[str, Any] = {"column_map": chosen.name, "source_files": [Path(one).name for one in sources]}
+    metadata: dict[str, Any] = {"column_map": chosen.name, "source_files": [Path(source).name for source in sources]}
     if piece.times.origin_s:
         metadata["time_origin_s"] = piece.times.origin_s
     if array is not None:

@@ -111,7 +111,7 @@ def read_mimu4444(path: str | Path) -> Recording:
         elapsed[first] * np.float64(_TICK),
         readings,
         array.channels,
-        {f"gyro_{axis}_rad_s": mean[:, place] for place, axis in enumerate(_GYRO_AXES)},
+        {f"gyro_{axis}_rad_s": mean[:, index] for index, axis in enumerate(_GYRO_AXES)},
         {
             **array_metadata(array),
             "part": part.name,
@@ -181,8 +181,8 @@ def _gyros_in_board_axes(counts: NDArray[np.int16], array: AccelerometerArray) -
     """Turn gyro counts (n, 8, 3) in chip axes into rates in board axes, rad/s; NaN where an axis is at full scale."""
     rates = np.where(np.isin(counts, _FULL_SCALE), np.nan, counts * _GYRO_LSB)
     turned = np.empty(rates.shape)
-    for number, chip in enumerate(array.chips):
+    for index, chip in enumerate(array.chips):
         # Chip axes are board axes but for order and sign: pick and flip, so that one NaN stays one NaN.
         source = np.argmax(np.abs(chip.axes), axis=0)
-        turned[:, number] = rates[:, number, source] * chip.axes[source, np.arange(3)]
+        turned[:, index] = rates[:, index, source] * chip.axes[source, np.arange(3)]
     return turned

@@ -129,8 +129,8 @@ class Recording(PlottedResult):
         panels = []
         for axis in dict.fromkeys(channel[-1] for channel in self.channels):
             series = tuple(
-                Series(name, self.readings[:, place], chip=chips.index(name[:-1]))
-                for place, name in enumerate(self.channels)
+                Series(name, self.readings[:, index], chip=chips.index(name[:-1]))
+                for index, name in enumerate(self.channels)
                 if name[-1] == axis
             )
             panels.append(Panel(f"axis {axis} of each chip", f"specific force, {unit}", series, self.t_s))
@@ -305,8 +305,8 @@ class Recording(PlottedResult):
     def to_columns(self) -> dict[str, NDArray[Any]]:
         """Return the columns of the file, by name with unit."""
         columns: dict[str, NDArray[Any]] = {"t_s": self.t_s}
-        for number, channel in enumerate(self.channels):
-            columns[f"{channel}_{self.unit}"] = self.readings[:, number]
+        for index, channel in enumerate(self.channels):
+            columns[f"{channel}_{self.unit}"] = self.readings[:, index]
         return columns | dict(self.reference) | dict(self.extra)
 
     @classmethod
@@ -406,7 +406,7 @@ class Recording(PlottedResult):
                 f"times (n,) and readings (n, {geometry.n_channels})"
             )
         columns: dict[str, Any] = {"t_s": time}
-        columns |= {f"{name}_{unit}": values[:, place] for place, name in enumerate(geometry.channels)}
+        columns |= {f"{name}_{unit}": values[:, index] for index, name in enumerate(geometry.channels)}
         columns |= {name: np.asarray(value, dtype=float) for name, value in (reference or {}).items()}
         for name, value in columns.items():
             if value.shape != time.shape:

@@ -159,11 +159,11 @@ def _second_difference_squares(phase: Floats, factors: NDArray[np.int64]) -> Flo
     """
     total = np.zeros(len(factors))
     for begin in range(0, len(phase), _BLOCK):
-        for place in range(len(factors)):
-            m = factors[place]
+        for index in range(len(factors)):
+            m = factors[index]
             part = 0.0
             for i in range(begin, min(begin + _BLOCK, len(phase) - 2 * m)):
                 second = phase[i + 2 * m] - 2.0 * phase[i + m] + phase[i]
                 part += second * second
-            total[place] += part
+            total[index] += part
     return total

@@ -304,7 +304,7 @@ def _flicker_variance(m: Floats) -> Floats:
     # u = f/rate; ∫ |H_m|² S df over both signs, S = 1/(2 sin πu): the oscillation of sin⁴ is resolved up to 40/m and
     # replaced by its mean 3/8 above.
     result = np.empty(len(m))
-    for place, factor in enumerate(m):
+    for index, factor in enumerate(m):
         split = min(40.0 / factor, 0.5)
         u = np.linspace(0.0, split, 8001)[1:]
         low = 2.0 * np.sin(np.pi * u * factor) ** 4 / (factor * np.sin(np.pi * u)) ** 2 / np.sin(np.pi * u)
@@ -312,5 +312,5 @@ def _flicker_variance(m: Floats) -> Floats:
         if split < 0.5:
             v = np.geomspace(split, 0.5, 400)
             total += float(np.trapezoid(0.75 / (factor * np.sin(np.pi * v)) ** 2 / np.sin(np.pi * v), v))
-        result[place] = total
+        result[index] = total
     return result

@@ -72,7 +72,7 @@ class LivePicture:
         """Send the array, the colours and names of the lines, and the layout; return what draws the rest."""
         array = self._array
         self._scene.log(stream)
-        chips = [chip_colour(number) for number in range(len(array.chips))]
+        chips = [chip_colour(index) for index in range(len(array.chips))]
         for axis, columns in enumerate(axis_columns(array)):
             names, colours = [array.channels[column] for column in columns], array.chip_of_channel[columns]
             _style(stream, f"readings/axis_{axis + 1}", names, [chips[int(chip)] for chip in colours], 1.2)

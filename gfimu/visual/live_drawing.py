@@ -57,7 +57,7 @@ class LiveDrawing:
     def __init__(self, stream: rr.RecordingStream, array: AccelerometerArray, length_per_m_s2: float) -> None:
         self._stream, self._array, self._length = stream, array, length_per_m_s2
         self._columns = axis_columns(array)
-        places = [np.flatnonzero(array.chip_of_channel == number) for number in range(len(array.chips))]
+        places = [np.flatnonzero(array.chip_of_channel == index) for index in range(len(array.chips))]
         self._sites = [(part, np.linalg.pinv(array.axes[part])) for part in places]  # (k,), (3, k) of each chip
         self._axes = channel_shapes(array)
         self._codes: tuple[HealthCode | None, ...] = ()

@@ -188,7 +188,7 @@ def reference_rate(recording: Recording, axis: NDArray[np.float64]) -> tuple[str
     if tacho is not None:
         return "tacho", tacho
     gyro = [recording.reference.get(f"gyro_{name}_rad_s") for name in "xyz"]
-    parts = [axis[place] * one for place, one in enumerate(gyro) if one is not None and abs(axis[place]) > 1e-9]
+    parts = [axis[index] * one for index, one in enumerate(gyro) if one is not None and abs(axis[index]) > 1e-9]
     missing = any(one is None and abs(axis[place]) > 1e-9 for place, one in enumerate(gyro))
     return None if missing else ("gyro", np.sum(parts, axis=0))
 

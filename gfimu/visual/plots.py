@@ -76,8 +76,8 @@ class Plot:
 
     def log(self, stream: rr.RecordingStream) -> None:
         """Write the lines, by columns."""
-        for number, line in enumerate(self.lines):
-            entity = f"{self.entity}/{number:02d}_{entity_part(line.name)}"
+        for index, line in enumerate(self.lines):
+            entity = f"{self.entity}/{index:02d}_{entity_part(line.name)}"
             t, values = broken_at_gaps(line.t, line.values.reshape(len(line.t), -1))
             count = values.shape[1]
             style = rr.SeriesLines(names=[line.name] * count, colors=[line.colour] * count, widths=[line.width] * count)

@@ -25,8 +25,8 @@ def conversion_groups(
         How the other chips are set up.
     """
     groups: dict[tuple[float, ...], list[int]] = {}
-    for number, chip in enumerate(array.chips):
+    for index, chip in enumerate(array.chips):
         sheet = DataSheet.load(chip.part, array.part_files)
         offsets = tuple(conversion_offsets(settings.of(chip), sheet).tolist())
-        groups.setdefault(offsets, []).extend(np.flatnonzero(array.chip_of_channel == number).tolist())
+        groups.setdefault(offsets, []).extend(np.flatnonzero(array.chip_of_channel == index).tolist())
     return [(np.array(offsets), np.array(columns)) for offsets, columns in groups.items()]

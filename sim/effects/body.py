@@ -120,7 +120,7 @@ class GyroScale(Effect):
     def patterns(cls, array: AccelerometerArray) -> tuple[Pattern, ...]:
         """Return all axes free, all alike, or one axis."""
         unit = np.eye(3)
-        single = (Pattern(f"gyro axis {axis}", unit[:, [place]]) for place, axis in enumerate(_AXES))
+        single = (Pattern(f"gyro axis {axis}", unit[:, [index]]) for index, axis in enumerate(_AXES))
         return (Pattern("all axes", unit), Pattern("all axes alike", np.ones((3, 1))), *single)
 
     def apply(self, world: World) -> World:

@@ -121,7 +121,7 @@ class MountTurn(Effect):
     def patterns(cls, array: AccelerometerArray) -> tuple[Pattern, ...]:
         """Return a turn about all axes, or about one of them, as of an array that lies flat but askew."""
         unit = np.eye(3)
-        single = (Pattern(f"about {axis}", unit[:, [place]]) for place, axis in enumerate("xyz"))
+        single = (Pattern(f"about {axis}", unit[:, [index]]) for index, axis in enumerate("xyz"))
         return (Pattern("", unit), *single)
 
     def apply(self, world: World) -> World:

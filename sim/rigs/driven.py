@@ -313,9 +313,9 @@ def _step_together(
             f"the driven table did not stay finite with a physics step of {run.step:g} s; "
             "give a shorter step_s, or a softer motor"
         )
-        if failed[place]
-        else _logged(run, models[place], times[place][::every], logs[place])
-        for place, run in enumerate(drives)
+        if failed[index]
+        else _logged(run, models[index], times[index][::every], logs[index])
+        for index, run in enumerate(drives)
     ]
 
 

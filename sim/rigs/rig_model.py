@@ -66,9 +66,9 @@ def turntable_spec(world: World, file: str = "turntable") -> mujoco.MjSpec:
     cube = spec.body("cube")
     cube.pos, cube.quat = world.cube_offset, _quaternion(mount)
     foot = mount.inv().apply(-world.cube_offset)  # of the cube on the axis, in cube axes
-    for number, lean in enumerate(world.leans):
+    for index, lean in enumerate(world.leans):
         axis = mount.inv().apply(lean.vector / np.linalg.norm(lean.vector))
-        cube.add_joint(name=f"{LEAN_JOINT}{number}", type=mujoco.mjtJoint.mjJNT_HINGE, axis=axis, pos=foot)
+        cube.add_joint(name=f"{LEAN_JOINT}{index}", type=mujoco.mjtJoint.mjJNT_HINGE, axis=axis, pos=foot)
     _fit_chips(spec, world.array, across_axis(arms, mount) if world.stretch else None)
     spec.option.gravity = [0.0, 0.0, -world.gravity]
     return spec
@@ -131,10 +131,10 @@ def _fit_chips(spec: mujoco.MjSpec, array: AccelerometerArray, arms: NDArray[np.
     for sensor in list(spec.sensors):
         spec.delete(sensor)
     looks = [spec.find_default("board"), spec.find_default("package")]
-    for place, chip in enumerate(array.chips):
+    for index, chip in enumerate(array.chips):
         body = cube.add_body(name=chip.name, pos=chip.position)
-        if arms is not None and np.any(arms[place]):
-            axis = arms[place] / np.linalg.norm(arms[place])
+        if arms is not None and np.any(arms[index]):
+            axis = arms[index] / np.linalg.norm(arms[index])
             body.add_joint(name=f"stretch_{chip.name}", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
         for look in looks:
             body.add_geom(look)

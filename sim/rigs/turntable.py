@@ -109,8 +109,8 @@ def _table_state(
         place = model.joint(NOD_JOINT).dofadr[0]
         lean = (part @ nod_axis(world) for part in world.nod.lean(spin))
         position[:, place], velocity[:, place], acceleration[:, place] = lean
-    for number, state in enumerate(leaning):
-        place = model.joint(f"{LEAN_JOINT}{number}").dofadr[0]
+    for index, state in enumerate(leaning):
+        place = model.joint(f"{LEAN_JOINT}{index}").dofadr[0]
         position[:, place], velocity[:, place], acceleration[:, place] = state
     if world.stretch:
         # Unless the arms are said to move, their own velocity is left out, as in the forward model.

@@ -92,7 +92,7 @@ class ChipWatch(Watch):
     def _word(self, value: int) -> None:
         ssp = self._ssp
         if self._low & (self._low - 1):
-            chips = [str(number + 1) for number in range(len(self.board.sensors)) if self._low >> number & 1]
+            chips = [str(index + 1) for index in range(len(self.board.sensors)) if self._low >> index & 1]
             self.report(TWO, f"chips {' and '.join(chips)} are selected at once")
         hz = TICKS_PER_SECOND / ssp.bit
         if hz > _SPI_MAX_HZ * (1.0 + _TOLERANCE):
@@ -118,12 +118,12 @@ class ChipWatch(Watch):
         if access.base != self.board.gpio.base or not access.write or access.offset >> 5 != _CS_PORT:
             return
         low = ~self.board.gpio.levels[_CS_PORT] & ((1 << len(self.board.sensors)) - 1)
-        for number, sensor in enumerate(self.board.sensors):
-            bit = 1 << number
+        for index, sensor in enumerate(self.board.sensors):
+            bit = 1 << index
             if low & bit and not self._low & bit:
-                self._selected(number)
+                self._selected(index)
             elif self._low & bit and not low & bit:
-                self._ended(number, sensor)
+                self._ended(index, sensor)
         self._low = low
 
     def _selected(self, number: int) -> None:

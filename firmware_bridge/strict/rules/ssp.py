@@ -37,7 +37,7 @@ class SspWatch(Watch):
         self._overrun = False
 
     def _ssp(self, access: Access) -> tuple[int, Ssp]:
-        return next((number, ssp) for number, ssp in enumerate(self.board.ssps) if ssp.base == access.base)
+        return next((index, ssp) for index, ssp in enumerate(self.board.ssps) if ssp.base == access.base)
 
     def before(self, access: Access) -> None:
         """Look at the interface before the access changes it."""

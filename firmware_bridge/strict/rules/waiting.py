@@ -51,7 +51,7 @@ class WaitWatch(Watch):
     def reset(self) -> None:
         """Nobody waits."""
         self._polled: dict[int, _Poll] = {}
-        stored = (one.base for one in self.board.peripherals if isinstance(one, StoredRegisters))
+        stored = (peripheral.base for peripheral in self.board.peripherals if isinstance(peripheral, StoredRegisters))
         self._outside = {_GPIO_BASE, *stored}
 
     def _level(self) -> int:

@@ -117,7 +117,7 @@ class DriftBudget(Declared, PlottedResult):
             "form_at_rest": text_column(term.form for term in self.terms),
             "size": np.array([term.size for term in self.terms]),
             "size_unit": text_column(term.size_unit for term in self.terms),
-            **{f"std_{axis}_m": std[:, place] for place, axis in enumerate("xyz")},
+            **{f"std_{axis}_m": std[:, index] for index, axis in enumerate("xyz")},
             "share": np.array([term.share for term in self.terms]),
         }
 
@@ -141,7 +141,7 @@ class DriftBudget(Declared, PlottedResult):
         names = (*(term.name for term in self.terms), "total")
         std = np.vstack([*(term.std for term in self.terms), self.total_std])
         std = np.where(std > 0.0, std, np.nan)
-        series = tuple(Series(axis, std[:, place], role=axis) for place, axis in enumerate("xyz"))
+        series = tuple(Series(axis, std[:, index], role=axis) for index, axis in enumerate("xyz"))
         return [Panel(f"position error after {self.time:g} s, by cause", "σ, m", series, names, scale="log")]
 
     @property

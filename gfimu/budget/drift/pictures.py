@@ -23,8 +23,8 @@ def rest_drift_picture(path: str | Path, found: RestDrift) -> None:
     for axis, axes in enumerate(figure.subplots(1, 3)):
         middle, band = (np.concatenate([[0.0], one[:, axis]]) for one in (mean, 2.0 * std))
         axes.fill_between(times, middle - band, middle + band, color=css(PALE), label="±2 σ, predicted from the noise")
-        for number, error in enumerate(found.error_m):
-            label = f"navigation, {len(found.start_s)} windows" if number == 0 else None
+        for index, error in enumerate(found.error_m):
+            label = f"navigation, {len(found.start_s)} windows" if index == 0 else None
             axes.plot(found.t_s, error[:, axis], color=css(AFTER_ON_PAPER), lw=0.9, label=label)
         axes.axhline(0.0, color=css(INK), lw=0.5)
         axes.set_title(f"{'xyz'[axis]}: rms {found.rms_m[axis]:.3g} m, predicted {found.predicted_m[axis]:.3g} m")

@@ -105,7 +105,7 @@ class RestDrift(Declared, PlottedResult):
         """Return one row per window: its start, the final position error and its predicted standard deviation."""
         columns = {"start_s": self.start_s}
         for name, values in (("position", self.final_m), ("predicted_std", self.predicted_std_m[:, -1])):
-            columns |= {f"{name}_{axis}_m": values[:, place] for place, axis in enumerate("xyz")}
+            columns |= {f"{name}_{axis}_m": values[:, index] for index, axis in enumerate("xyz")}
         return columns
 
     def _heading(self) -> str:
@@ -128,8 +128,8 @@ class RestDrift(Declared, PlottedResult):
         for place, axis in enumerate("xyz"):
             predicted = Series("predicted", mean[:, place], std[:, place], x=self.predicted_t_s, role="noise")
             windows = [
-                Series("navigation" if number == 0 else "", error[:, place], role=axis)
-                for number, error in enumerate(self.error_m)
+                Series("navigation" if index == 0 else "", error[:, place], role=axis)
+                for index, error in enumerate(self.error_m)
             ]
             panels.append(Panel(f"position error, {axis}", "m", (predicted, *windows), self.t_s))
         return panels

@@ -243,9 +243,9 @@ def integrated_with_feedback(forcing: Floats, feedback: Floats, step: float) -> 
     """Integrate δω̇ = u − Λ_α S δω from zero by the trapezoid, for m parameters at once, shape (n, 3, m)."""
     found = np.zeros_like(forcing)
     eye, half = np.eye(3), 0.5 * step
-    for place in range(len(forcing) - 1):
-        right = (eye - half * feedback[place]) @ found[place] + half * (forcing[place] + forcing[place + 1])
-        found[place + 1] = np.linalg.solve(eye + half * feedback[place + 1], right)
+    for index in range(len(forcing) - 1):
+        right = (eye - half * feedback[index]) @ found[index] + half * (forcing[index] + forcing[index + 1])
+        found[index + 1] = np.linalg.solve(eye + half * feedback[index + 1], right)
     return found
 
 
@@ -295,11 +295,11 @@ class _NoiseParts:
         constant = unit / self.rest if self.rest else np.zeros((3, 3))
         covariance, total = np.zeros((3, 3)), np.zeros((3, 3))
         response = np.zeros((3, 3))  # of the rate to a constant error of α: that of the biases read at rest
-        for place in range(len(feedback)):
+        for index in range(len(feedback)):
             whole = covariance + response @ constant @ response.T
-            total += feedback[place] @ whole @ feedback[place].T
-            if place >= self.rest:  # the mean over the rest takes the integral over it to zero
-                flow = np.eye(3) - step * feedback[place]
+            total += feedback[index] @ whole @ feedback[index].T
+            if index >= self.rest:  # the mean over the rest takes the integral over it to zero
+                flow = np.eye(3) - step * feedback[index]
                 covariance = flow @ covariance @ flow.T + step**2 * unit
                 response = flow @ response + step * np.eye(3)
         return total / len(feedback)

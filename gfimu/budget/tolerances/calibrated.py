@@ -220,7 +220,7 @@ def _of_posterior(posterior: Calibration, array: AccelerometerArray, motion: Kno
 def _corrected(calibration: Calibration, array: AccelerometerArray, readings: Floats) -> Floats:
     """Return readings (n, c) corrected by a calibration of an array."""
     found = np.empty_like(readings)
-    for number, chip in enumerate(array.chips):
-        mine = array.chip_of_channel == number
+    for index, chip in enumerate(array.chips):
+        mine = array.chip_of_channel == index
         found[:, mine] = calibration.models[chip.name].correct(readings[:, mine])
     return found

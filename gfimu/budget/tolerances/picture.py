@@ -92,8 +92,8 @@ def _distributions(
 ) -> None:
     """Draw the cumulative distribution of the error over units after each calibration."""
     ends: list[float] = []
-    for number, (calibration, one) in enumerate(quantities.items()):
-        colour = _LINES[number % len(_LINES)]
+    for index, (calibration, one) in enumerate(quantities.items()):
+        colour = _LINES[index % len(_LINES)]
         curves = [(np.sort(one.draw(DRAWS, shape, np.random.default_rng(0))), "--")]
         if calibration in simulated:
             found = simulated[calibration]
@@ -127,13 +127,13 @@ def _distributions(
 
 
 def _shares(axes: Axes, quantities: Mapping[str, QuantityBudget]) -> None:
-    for place, one in enumerate(quantities.values()):
+    for index, one in enumerate(quantities.values()):
         start = 0.0
         for cause, share in one.shares.items():
-            axes.barh(place, share, left=start, height=0.72, color=_colour(cause), edgecolor="white", lw=0.6)
+            axes.barh(index, share, left=start, height=0.72, color=_colour(cause), edgecolor="white", lw=0.6)
             if share >= _LABELLED:
                 text = f"{cause} {share:.0%}" if share >= 2.5 * _LABELLED else f"{share:.0%}"
-                axes.text(start + share / 2, place, text, ha="center", va="center", fontsize=7.5, color="white")
+                axes.text(start + share / 2, index, text, ha="center", va="center", fontsize=7.5, color="white")
             start += share
     axes.set_yticks(range(len(quantities)), [f"{name}\n{one.rms:.3g} {one.unit}" for name, one in quantities.items()])
     axes.tick_params(labelsize=8.5, length=0)

@@ -108,10 +108,10 @@ class ToleranceResult(Declared, PlottedResult):
     def to_columns(self) -> dict[str, NDArray[Any]]:
         """Return one row per calibration, quantity and cause: the rms error it makes, its share of the variance."""
         rows = [
-            (calibration, one, cause)
+            (calibration, quantity, cause)
             for calibration, budget in self.budgets.items()
-            for one in budget.quantities.values()
-            for cause in one.by_cause
+            for quantity in budget.quantities.values()
+            for cause in quantity.by_cause
         ]
         return {
             "calibration": text_column(calibration for calibration, _, _ in rows),
@@ -163,7 +163,7 @@ class ToleranceResult(Declared, PlottedResult):
             "Error, norm of three components, rms over units",
             ("calibration", *(one.column for one in first.values())),
             [
-                (name, *(self._total(one) for one in errors.quantities.values()))
+                (name, *(self._total(quantity) for quantity in errors.quantities.values()))
                 for name, errors in calibrations.items()
             ],
             note="; ".join(f"{_SHORT[name]}: {one.budget.meaning}" for name, one in first.items()),
@@ -178,9 +178,9 @@ class ToleranceResult(Declared, PlottedResult):
 
     def _table_of_causes(self, calibration: str, errors: CalibrationErrors) -> Table:
         """Return shares, totals and simulated units after one calibration."""
-        budgets = [one.budget for one in errors.quantities.values()]
+        budgets = [quantity.budget for quantity in errors.quantities.values()]
         rows: list[tuple[str, ...]] = [
-            (cause, *(f"{one.shares[cause]:.1%}" if cause in one.shares else "0" for one in budgets))
+            (cause, *(f"{budget.shares[cause]:.1%}" if cause in budget.shares else "0" for budget in budgets))
             for cause in CAUSES
             if any(cause in one.by_cause for one in budgets)
         ]

@@ -85,8 +85,8 @@ def axis_pairs(array: AccelerometerArray) -> list[tuple[int, int]]:
 def _cross_axis(array: AccelerometerArray, readings: Floats, std: Floats) -> Floats:
     pairs = axis_pairs(array)
     columns = np.zeros((*readings.shape, len(pairs)))  # (n, c, m)
-    for place, (picking, picked) in enumerate(pairs):
-        columns[:, picking, place] = readings[:, picked] * std[picking]
+    for index, (picking, picked) in enumerate(pairs):
+        columns[:, picking, index] = readings[:, picked] * std[picking]
     return columns
 
 

@@ -69,7 +69,7 @@ def chip_parameters(calibration: Calibration) -> tuple[ChipParameters, ...]:
     Where magnitudes alone were used, the rotation of the three sensing axes against the case was not determined. The
     frame is then that of the sensing axes themselves (gauge ``x_axis``), in which everything is determined.
     """
-    return tuple(_of_chip(calibration, number, chip) for number, chip in enumerate(calibration.chips))
+    return tuple(_of_chip(calibration, index, chip) for index, chip in enumerate(calibration.chips))
 
 
 def _of_chip(calibration: Calibration, number: int, chip: str) -> ChipParameters:

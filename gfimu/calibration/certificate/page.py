@@ -231,7 +231,7 @@ def _share(std: float, combined: float) -> str:
 
 
 def _freedom(components: Iterable[Component]) -> str:
-    values = [one.degrees_of_freedom for one in components]
+    values = [component.degrees_of_freedom for component in components]
     finite = [value for value in values if value is not None]
     return f"{min(finite):.3g}" if finite else "∞"
 

@@ -38,8 +38,8 @@ def write_euroc(folder: str | Path, recording: Recording) -> list[Path]:
     streams = list(chips_of(recording))
     stamps = stamps_ns(recording)
     written = []
-    for number, stream in enumerate(streams):
-        place = root / f"imu{number}"
+    for index, stream in enumerate(streams):
+        place = root / f"imu{index}"
         place.mkdir(parents=True)
         rate = np.full_like(stream.force, np.nan) if stream.rate is None else stream.rate
         rows = (

@@ -52,14 +52,14 @@ def calibration_as_kalibr(chips: Sequence[CalibratedChip], *, notes: Sequence[st
         *(f"# {' '.join(note.split())}" for note in notes),
     ]
     first: NDArray[np.float64] | None = None
-    for place, chip in enumerate(chips):
+    for index, chip in enumerate(chips):
         lower, rotation, covariance = lower_form(chip)
         pose = np.eye(4)
         pose[:3, :3], pose[:3, 3] = rotation, -rotation @ chip.chip.position
         first = pose if first is None else first
-        relative = np.eye(4) if place == 0 else pose @ np.linalg.inv(first)
-        lines += [f"imu{place}:", "  model: scale-misalignment", f"  T_i_b: {numbers(relative)}", "  time_offset: 0.0"]
-        lines += [f"  rostopic: /imu{place}", *_noise(chip)]
+        relative = np.eye(4) if index == 0 else pose @ np.linalg.inv(first)
+        lines += [f"imu{index}:", "  model: scale-misalignment", f"  T_i_b: {numbers(relative)}", "  time_offset: 0.0"]
+        lines += [f"  rostopic: /imu{index}", *_noise(chip)]
         lines += ["  accelerometers:", f"    M: {numbers(lower)}", "  gfimu:", f"    chip: {text(chip.chip.name)}"]
         lines += [f"    lsb_m_s2: {number(chip.scale)}", f"    bias_m_s2: {numbers(chip.bias)}"]
         lines += [f"    T_i_array: {numbers(pose)}", f"    parameters: [{', '.join(_NAMES)}]", "    covariance:"]

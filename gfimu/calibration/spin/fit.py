@@ -94,7 +94,7 @@ def spin(
         largest=np.maximum(np.nanmax(np.abs(run.readings), axis=0), np.finfo(float).eps),
         policy=table,
     )
-    gains = np.concatenate([np.linalg.norm(one.sensitivity, axis=1) for one in nominal.calibration.models.values()])
+    gains = np.concatenate([np.linalg.norm(model.sensitivity, axis=1) for model in nominal.calibration.models.values()])
     plateaus = find_plateaus(run, gains * gravity * table.lean_std_rad, min_plateau_s, table)
     speeds = plateaus.speeds(table.distinct)
     if len(speeds) < _FEWEST_SPEEDS:
@@ -189,7 +189,7 @@ class _Problem:
         ):
             std[getattr(layout, name)] = np.maximum(value, np.finfo(float).eps)
         # Fitted positions are parameters of the earlier calibration and unknowns of the table at once.
-        sensing = [place for place, name in enumerate(start.names) if "_r_" not in name]
+        sensing = [index for index, name in enumerate(start.names) if "_r_" not in name]
         count = len(sensing)
         values, covariance = np.zeros(count + layout.size), np.zeros((count + layout.size,) * 2)
         values[:count] = start.values[sensing]
@@ -264,11 +264,11 @@ class _Problem:
         """Return the arm along each sensing axis across the table's, as weights of the unknowns, by name of its K1."""
         across, axis = self.geometry.frame[:2], self.geometry.frame[2]
         found = {}
-        for number, chip in enumerate(self.geometry.array.chips):
+        for index, chip in enumerate(self.geometry.array.chips):
             for sensing, letter in zip(chip.axes, "xyz", strict=True):
                 if abs(float(sensing @ axis)) < _ACROSS:
                     weights = np.zeros(len(self.values))
-                    weights[self.at["radii"][3 * number : 3 * number + 3]] = sensing
+                    weights[self.at["radii"][3 * index : 3 * index + 3]] = sensing
                     weights[self.at["offset"]] = -across @ sensing
                     weights[self.at["drawing"]] = np.cross(chip.position, sensing)
                     found[f"{chip.name}_M_{letter}{letter}"] = weights
@@ -310,8 +310,8 @@ def _axis(
 
     def body(readings: Floats) -> Floats:
         parts = [
-            model.correct(readings[:, 3 * number : 3 * number + 3]) @ chip.axes
-            for number, (model, chip) in enumerate(zip(start.models.values(), array.chips, strict=True))
+            model.correct(readings[:, 3 * index : 3 * index + 3]) @ chip.axes
+            for index, (model, chip) in enumerate(zip(start.models.values(), array.chips, strict=True))
         ]
         return np.asarray(np.mean(parts, axis=0), dtype=np.float64)
 

@@ -135,10 +135,10 @@ class SpinGeometry:
     def slopes(self, unknowns: Floats, std: Floats) -> Floats:
         """Return the derivatives of `forces` by the unknowns, shape (k, chips, 3, m), by central differences."""
         found = []
-        for place in range(len(unknowns)):
+        for index in range(len(unknowns)):
             step = np.zeros(len(unknowns))
-            step[place] = _STEP * std[place]
-            found.append((self.forces(unknowns + step) - self.forces(unknowns - step)) / (2.0 * step[place]))
+            step[index] = _STEP * std[index]
+            found.append((self.forces(unknowns + step) - self.forces(unknowns - step)) / (2.0 * step[index]))
         return np.stack(found, axis=-1)
 
 
@@ -178,18 +178,18 @@ def read_plateaus(
     k, chips, _ = forces.shape
     readings = np.zeros((k, chips, 3))
     jacobian = np.zeros((k, chips, 3, sensors + len(unknowns)))
-    for number, model in enumerate(models):
-        force = forces[:, number]
-        readings[:, number] = model.read(force)
-        u = readings[:, number] - model.bias
+    for index, model in enumerate(models):
+        force = forces[:, index]
+        readings[:, index] = model.read(force)
+        u = readings[:, index] - model.bias
         gain = 1.0 / (1.0 - u * (2.0 * model.quadratic + 3.0 * model.cubic * u))  # (k, 3)
-        jacobian[:, number, :, sensors:] = gain[:, :, None] * (model.sensitivity @ slopes[:, number])
+        jacobian[:, index, :, sensors:] = gain[:, :, None] * (model.sensitivity @ slopes[:, index])
         for row, i in enumerate("xyz"):
-            own = jacobian[:, number, row]
-            own[:, place(number, f"b_{i}")] = 1.0
-            own[:, place(number, f"q_{i}")] = gain[:, row] * u[:, row] ** 2
-            own[:, place(number, f"c_{i}")] = gain[:, row] * u[:, row] ** 3
+            own = jacobian[:, index, row]
+            own[:, place(index, f"b_{i}")] = 1.0
+            own[:, place(index, f"q_{i}")] = gain[:, row] * u[:, row] ** 2
+            own[:, place(index, f"c_{i}")] = gain[:, row] * u[:, row] ** 3
             for column, j in enumerate("xyz"):
-                if (at := place(number, f"M_{i}{j}")) >= 0:
+                if (at := place(index, f"M_{i}{j}")) >= 0:
                     own[:, at] = gain[:, row] * force[:, column]
     return readings.reshape(k, -1), jacobian.reshape(k, 3 * chips, -1)

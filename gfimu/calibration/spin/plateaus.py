@@ -157,7 +157,7 @@ def _saturated(readings: Floats, stretches: list[tuple[int, int]], policy: SpinP
     """Return where a channel sits at its own extreme, (k, c), although its noise is wider than a count elsewhere."""
     extremes = np.nanmax(readings, axis=0), np.nanmin(readings, axis=0)
     parts = [readings[start:stop] for start, stop in stretches]
-    at_limit = np.array([[np.mean(part == one, axis=0) for one in extremes] for part in parts])  # (k, 2, c)
+    at_limit = np.array([[np.mean(part == extreme, axis=0) for extreme in extremes] for part in parts])  # (k, 2, c)
     at_own = [
         np.maximum(np.mean(part == part.max(axis=0), axis=0), np.mean(part == part.min(axis=0), axis=0))
         for part in parts

@@ -122,8 +122,8 @@ def _of_data_sheets(recording: Recording, array: AccelerometerArray) -> Calibrat
         scale = 1.0 / (limits.lsb if count is None else np.full(array.n_channels, float(count)))
     names: list[str] = []
     values, std = [], []
-    for number, chip in enumerate(array.chips):
-        own = slice(3 * number, 3 * number + 3)
+    for index, chip in enumerate(array.chips):
+        own = slice(3 * index, 3 * index + 3)
         gain, side = scale[own, None] * np.eye(3), scale[own, None] * (1.0 - np.eye(3))
         names += parameter_names(chip.name, "array")
         values += [*gain.ravel(), *np.zeros(3)]

@@ -52,7 +52,7 @@ def body_functions(stretch: BodyStretch, drive: HandDrive) -> dict[str, NDArray[
     rate, acceleration = drive.spin.rate_at()
     speed = np.linalg.norm(rate, axis=1)
     time = (stretch.run.t - stretch.run.t[0]) / max(stretch.run.duration, 1e-9)
-    found = {f"ω{axis}": rate[:, place] for place, axis in enumerate("xyz")}
+    found = {f"ω{axis}": rate[:, index] for index, axis in enumerate("xyz")}
     found |= dict(zip(("ωx²", "ωy²", "ωz²", "ωxωy", "ωxωz", "ωyωz"), omega_products(rate).T, strict=True))
     found |= {f"dω{axis}/dt": acceleration[:, place] for place, axis in enumerate("xyz")}
     found |= {"|ω|": speed, "|ω|⁴": speed**4, "the specific force squared": np.sum(drive.spin.force**2, axis=1)}

@@ -60,7 +60,7 @@ def expected_score(stretch: Stretch, at: Posterior, values_of: ValuesOf) -> NDAr
         size = np.maximum(std[order], 1e-12 * (1.0 + np.abs(state[order])))
         ends = []
         for sign in (1.0, -1.0):
-            moved = [one + sign * size if place == order else one for place, one in enumerate(state)]
+            moved = [one + sign * size if index == order else one for index, one in enumerate(state)]
             ends.append(values_of(State(*moved[:3]), moved[3]))
         # The slope over ± one standard deviation: the expected one, also at the kink of |ω|.
         slope = (ends[0] - ends[1]) / (2.0 * size[:, None])  # (n, k)
@@ -113,7 +113,7 @@ def expected_score_of_causes(stretch: Stretch, at: Posterior, causes: Sequence[C
         if size <= 0.0:
             continue
         for sign in (1.0, -1.0):
-            moved = _Moved(at.drive.spin, [sign * size if place == order else 0.0 for place in range(len(_STATE) - 1)])
+            moved = _Moved(at.drive.spin, [sign * size if index == order else 0.0 for index in range(len(_STATE) - 1)])
             seen = replace(at.observed, prediction=stretch.predict(effects, moved))
             columns = cause_columns(stretch, seen, moved, causes)
             for c, (places, part) in enumerate(zip(columns.places, columns.parts, strict=True)):

@@ -108,8 +108,8 @@ def split(stretches: Sequence[Stretch], found: Fit, policy: Policy, *, duration:
     for stretch, drive, levels in zip(stretches, found.point.drives, found.point.levels, strict=True):
         effects = effects_of(found.causes, stretch.model.array, stretch.index)
         pairs = max(1, round(float(np.ptp(stretch.run.t[stretch.counted])) / (2 * length)))
-        for place, (start, stop) in enumerate(pairwise(stretch.parts(2 * pairs))):
-            parts[place % 2].append((*_block(stretch, drive, effects, start, stop, policy), levels))
+        for index, (start, stop) in enumerate(pairwise(stretch.parts(2 * pairs))):
+            parts[index % 2].append((*_block(stretch, drive, effects, start, stop, policy), levels))
     odd, even = (Part(*zip(*part, strict=True)) for part in parts)
     return [Holdout(odd, even, residue), Holdout(even, odd, residue)]
 

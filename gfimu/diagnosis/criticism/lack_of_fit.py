@@ -94,7 +94,7 @@ def lack_of_fit(
     if not rounded:
         states = [motion_of(one, fit.point, drive) for one, drive in zip(stretches, fit.point.drives, strict=True)]
         candidates.append(changing_noise(stretches, seen, states, policy))
-    if spikes > max(policy.spikes, policy.spike_share * sum(one.mask.size for one in stretches)):
+    if spikes > max(policy.spikes, policy.spike_share * sum(stretch.mask.size for stretch in stretches)):
         text = f"{spikes} isolated samples far off their neighbours"
         candidates.append(LackOfFit(policy.lack_odds * spikes, text, {}))
     return max(candidates, key=lambda found: found.log_odds)
@@ -102,7 +102,7 @@ def lack_of_fit(
 
 def _of_body(stretches: Sequence[Any], point: Point, candidates: Sequence[LackOfFit], policy: Policy) -> LackOfFit:
     """Return the strongest of a dependence and a tone, and beside it the noise that grows with the motion."""
-    tones = [tone(one, policy) for one in linearise(stretches, point).posteriors]
+    tones = [tone(posterior, policy) for posterior in linearise(stretches, point).posteriors]
     found = max([*candidates, *tones], key=lambda one: one.log_odds)
     noise = motion_noise(stretches, point.levels, policy)
     if noise.noise_odds <= policy.lack_odds:

@@ -34,12 +34,12 @@ def reading_curve(stretches: Sequence[Stretch], found: Fit, policy: Policy = Pol
         Thresholds of fits, and ``extra_cause``.
     """
     array, best = stretches[0].model.array, LackOfFit(-np.inf, "", {})
-    for number, channel in enumerate(array.channels):
-        mine = [cause for cause in found.causes if _distorts(cause, array.n_channels, number)]
+    for index, channel in enumerate(array.channels):
+        mine = [cause for cause in found.causes if _distorts(cause, array.n_channels, index)]
         if all(cause.place != f"channel {channel}" for cause in mine):
             continue
         family = stretches[0].model.unnamed(OF_READING, basis_units(stretches, found.point))
-        cubic = Cause(family, OF_READING, np.eye(array.n_channels)[:, [number]], {}, np.zeros(1))
+        cubic = Cause(family, OF_READING, np.eye(array.n_channels)[:, [index]], {}, np.zeros(1))
         others = tuple(cause for cause in found.causes if all(cause is not one for one in mine))
         instead = fit(stretches, replace(found.point, causes=(*others, cubic)), policy)
         priors = [cause.log_prior for cause in mine]
@@ -47,7 +47,7 @@ def reading_curve(stretches: Sequence[Stretch], found: Fit, policy: Policy = Pol
         odds -= policy.extra_cause * (len(mine) - 1)
         if odds > best.log_odds:
             text = f"channel {channel} follows a curve of its reading that the library has not (cubic)"
-            size = float(instead.causes[-1].sizes(array, 0)[number])
+            size = float(instead.causes[-1].sizes(array, 0)[index])
             best = LackOfFit(odds, text, {f"{channel}: {OF_READING}": size}, instead=True, hints=(OF_READING,))
     return best
 

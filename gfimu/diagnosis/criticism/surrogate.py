@@ -112,7 +112,7 @@ def surrogates(
     )
     found = _ever_richer([stretches[place] for place in chosen], some, policy, units, hints)
     ends = found if len(found) < 3 else [found[0], found[-1]]
-    return [Surrogate(_settled(stretches, replace(point, causes=one.terms), policy)) for one in ends]
+    return [Surrogate(_settled(stretches, replace(point, causes=end.terms), policy)) for end in ends]
 
 
 def _without_walk(stretches: Sequence[Stretch], point: Point) -> Point:
@@ -128,7 +128,7 @@ def _spread(runs: Sequence[int], most: int) -> list[int]:
     """Pick about so many places of stretches, given the run of each: evenly spread, one of every run at least."""
     chosen: list[int] = []
     for run in dict.fromkeys(runs):
-        mine = [place for place, number in enumerate(runs) if number == run]
+        mine = [index for index, number in enumerate(runs) if number == run]
         count = min(max(round(most * len(mine) / len(runs)), 1), len(mine))
         chosen += [mine[int(place)] for place in np.linspace(0, len(mine) - 1, count).round()]
     return chosen
@@ -231,7 +231,7 @@ def _greedy(
         score = score - gain.T @ score[best]
         gram = gram - gain.T @ gram[best]
         usable[best] = False
-    return [one for place, one in enumerate(chosen) if not one.is_in([*chosen[:place], *chosen[place + 1 :]])]
+    return [one for index, one in enumerate(chosen) if not one.is_in([*chosen[:index], *chosen[index + 1 :]])]
 
 
 def _line_functions(stretches: Sequence[Stretch], point: Point) -> list[str]:

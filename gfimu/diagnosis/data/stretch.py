@@ -327,7 +327,7 @@ def _parts(counted: NDArray[np.bool_], first: int, end: int, count: int) -> list
 def _coarse_step(model: WorldModel, run: Run, faults: Sequence[Effect]) -> float:
     """Return the step of the readings where it is coarse, m/s²; 0 where it is finer than their noise."""
     expected = model.expected_noise(run.output_data_rate)
-    found = [float(one.parameters["step_m_s2"]) for one in faults if one.name == "coarse_resolution"]
+    found = [float(fault.parameters["step_m_s2"]) for fault in faults if fault.name == "coarse_resolution"]
     quantum = found[-1] if found else expected.quantum
     return quantum if quantum > COARSE * float(np.median(expected.analogue)) else 0.0
 
@@ -348,7 +348,7 @@ def moved(values: NDArray[np.float64], share: NDArray[np.float64]) -> NDArray[np
         -u * (u - 1.0) * (u - 3.0) / 2.0,
         u * (u - 1.0) * (u - 2.0) / 6.0,
     )
-    near = (np.take_along_axis(values, first + place, axis=0) for place in range(len(weights)))
+    near = (np.take_along_axis(values, first + index, axis=0) for index in range(len(weights)))
     return np.asarray(sum(weight * one for weight, one in zip(weights, near, strict=True)))
 
 

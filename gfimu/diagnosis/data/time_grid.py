@@ -127,8 +127,8 @@ def _apart(steps: NDArray[np.float64]) -> NDArray[np.intp]:
     scatter = steps - np.maximum(1.0, np.rint(steps))
     spread = max(1.4826 * float(np.median(np.abs(scatter - np.median(scatter)))) / np.sqrt(2.0), _SMOOTH)
     paths = {0: _Path(0.0, 0.0, 0.0, None)}
-    for number, step in enumerate(steps):
-        memory = min(number + _FIRST_MEMORY, _MEMORY)
+    for index, step in enumerate(steps):
+        memory = min(index + _FIRST_MEMORY, _MEMORY)
         gain, drift = 2.0 / memory, 1.0 / memory**2
         wanted: dict[int, _Path] = {}
         for lost, path in paths.items():
@@ -143,7 +143,7 @@ def _apart(steps: NDArray[np.float64]) -> NDArray[np.intp]:
                 # An outlier moves the grid no further than the spread would.
                 limited = min(max(error, -3.0 * spread), 3.0 * spread)
                 rate = min(max(path.rate + drift * limited, -_MOST_RATE), _MOST_RATE)
-                losses = _Loss(number, more, path.losses) if more else path.losses
+                losses = _Loss(index, more, path.losses) if more else path.losses
                 wanted[total] = _Path(error - gain * limited, rate, cost, losses)
         best = min(path.cost for path in wanted.values())
         near = sorted((one for one in wanted.items() if one[1].cost < best + _FAR), key=lambda one: one[1].cost)

@@ -104,8 +104,8 @@ def design(
 
     points = starting_points(rng, _STARTS)
     tables = []
-    for number, point in enumerate(points):
-        progress(0.1 * number / len(points), "first profiles")
+    for index, point in enumerate(points):
+        progress(0.1 * index / len(points), "first profiles")
         tables.append(upright.table(profile_of(point, allowed)))
     ranked = [(_score(table), point) for table, point in zip(tables, points, strict=True)]
     inseparable = _never_parted(tables)

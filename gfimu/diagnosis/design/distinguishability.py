@@ -154,7 +154,7 @@ def distinguishability(
         others = np.arange(count) != i
         rivals = [rival for rival, other in zip(contenders, others, strict=True) if other]
         energy[i, others] = energy_left(gram, one, rivals, largest_rival=largest_rival)
-    return Distinguishability(tuple(one.name for one in contenders), detectability, energy)
+    return Distinguishability(tuple(contender.name for contender in contenders), detectability, energy)
 
 
 def energy_left(
@@ -192,10 +192,10 @@ def _explained_by_one_sign(
     lower = np.where(positive, 0.0, -np.inf)
     signs = (1.0, -1.0) if both_signs else (1.0,)
     explained = np.zeros(target.shape[1])
-    for place, wanted in enumerate(target.T):
+    for index, wanted in enumerate(target.T):
         for sign in signs:
             best = lsq_linear(root.T, sign * wanted, (lower, np.inf))
-            explained[place] += (wanted @ wanted - 2.0 * best.cost) / len(signs)
+            explained[index] += (wanted @ wanted - 2.0 * best.cost) / len(signs)
     return explained
 
 
@@ -228,7 +228,7 @@ def plan_contenders(
     for request in effects:
         name = request if isinstance(request, str) else str(request.name)
         family = _sized_family(families, name, model)
-        if any(one.name == name for one in contenders):
+        if any(contender.name == name for contender in contenders):
             raise InputError(f"effect {name!r} is named twice; name different effects")
         sizes = family.sizes(array)
         blocks = runs if family.per_run else 1

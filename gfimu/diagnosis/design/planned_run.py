@@ -101,7 +101,7 @@ def planned(
     noise_rate : float, optional
         As `PlannedRun.levels` takes it.
     """
-    stretches = tuple(run.stretch(model, first + place) for place, run in enumerate(runs))
+    stretches = tuple(run.stretch(model, first + index) for index, run in enumerate(runs))
     spacing = Policy().knots
     drives = tuple(run.drive(stretch, spacing) for run, stretch in zip(runs, stretches, strict=True))
     return stretches, Point((), drives, tuple(run.levels(model, noise_rate) for run in runs))

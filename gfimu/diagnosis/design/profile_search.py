@@ -128,7 +128,7 @@ def _finished(legs: Sequence[Leg], limits: Limits) -> TableProfile:
         if ticks > 0:
             done.append(Leg(round(to, 3), round(ticks * _TIME_STEP, 2)))
             rate = to
-    holds = [place for place in range(len(done)) if done[place].to == (done[place - 1].to if place else 0.0)]
+    holds = [index for index in range(len(done)) if done[index].to == (done[index - 1].to if index else 0.0)]
     excess = sum(leg.duration for leg in done) + min(1.0, 0.02 * limits.duration) - limits.duration
     for place in sorted(holds, key=lambda place: -done[place].duration):
         cut = math.ceil(min(max(excess, 0.0), 0.9 * done[place].duration) / _TIME_STEP) * _TIME_STEP
@@ -201,7 +201,7 @@ def improve(
     """
     climbed = sorted(ranked, key=lambda pair: -pair[0])[:_CLIMBED]
     tried = 0
-    for number, (start_value, start) in enumerate(climbed):
+    for index, (start_value, start) in enumerate(climbed):
         value, point, step = start_value, start, 0.15
         for _ in range(evaluations // len(climbed)):
             chosen = rng.random(_PARAMETERS) < 0.3
@@ -214,5 +214,5 @@ def improve(
             value, point = (reached, trial) if better else (value, point)
             tried += 1
             report(tried / evaluations)
-        climbed[number] = (value, point)
+        climbed[index] = (value, point)
     return profile_of(max(climbed, key=lambda pair: pair[0])[1], limits)

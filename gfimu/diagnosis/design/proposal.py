@@ -114,8 +114,8 @@ class Proposal(Declared, PlottedResult):
         """Margins of each effect over each rival."""
         parts = (self.before.nats, self.after.nats, self.before.unexplained, self.after.unexplained)
         return [
-            Pair(one, other, *(float(part[i, j]) for part in parts))
-            for i, one in enumerate(self.effects)
+            Pair(effect, other, *(float(part[i, j]) for part in parts))
+            for i, effect in enumerate(self.effects)
             for j, other in enumerate(self.effects)
             if i != j
         ]
@@ -127,7 +127,7 @@ class Proposal(Declared, PlottedResult):
     def to_columns(self) -> dict[str, NDArray[Any]]:
         """Return one row per effect and rival: nats and unexplained share, before and after the experiment."""
         pairs = self.pairs
-        rows = [one.row() for one in pairs]
+        rows = [pair.row() for pair in pairs]
         return {
             "effect": text_column(one.effect for one in pairs),
             "rival": text_column(one.rival for one in pairs),
@@ -234,5 +234,5 @@ def scenario_of(
         "mounting_rotvec_rad": list(mounting),
         "sensor": {**twin.get("sensor", {}), "errors": False},
         "reference": {"tacho_noise_std_rad_s": PlannedRun.reference_noise},
-        "motion": {"kind": "profile", "segment": [one.to_dict() for one in profile.segments]},
+        "motion": {"kind": "profile", "segment": [segment.to_dict() for segment in profile.segments]},
     }

@@ -96,7 +96,7 @@ class CheckedRun(Declared):
     def shares(self) -> Annotated[str, figure("Shares.", head="forwards / backwards / rest", in_json=False)]:
         """Shares of the time in each direction and at rest, in percent."""
         shares = [one for one in (self.share_forwards, self.share_backwards, self.share_at_rest) if one is not None]
-        return " / ".join(f"{100 * one:.0f}" for one in shares) + " %" if shares else ""
+        return " / ".join(f"{100 * share:.0f}" for share in shares) + " %" if shares else ""
 
     @property
     def in_words(self) -> str:
@@ -163,7 +163,7 @@ class RunCheck(Declared, PlottedResult):
     def to_columns(self) -> dict[str, NDArray[Any]]:
         """Return one row per effect: how well the motion shows it, and what it is confounded with."""
         return {
-            "effect": text_column(one.name for one in self.effects),
+            "effect": text_column(effect.name for effect in self.effects),
             "detectability": np.array([one.detectability for one in self.effects], dtype=float),
             "seen": np.array([one.seen for one in self.effects], dtype=bool),
             "confused_with": text_column(", ".join(one.confused_with) for one in self.effects),
@@ -172,9 +172,9 @@ class RunCheck(Declared, PlottedResult):
     def shown(self) -> Iterator[Table | str]:
         """Yield the tables and sentences that people read."""
         yield table("Recordings", self.runs, "name duration_s sample_rate_hz fastest acceleration turns shares")
-        for one in self.runs:
-            if one.lowest_degC is not None:
-                yield f"Temperature of {one.name}: {one.lowest_degC:.4g} to {one.highest_degC:.4g} °C."
+        for run in self.runs:
+            if run.lowest_degC is not None:
+                yield f"Temperature of {run.name}: {run.lowest_degC:.4g} to {run.highest_degC:.4g} °C."
         yield self._data
         if self.effects:
             yield table(
@@ -187,10 +187,10 @@ class RunCheck(Declared, PlottedResult):
 
     def in_short(self) -> Iterator[str]:
         """Yield a few lines, to stand before a diagnosis."""
-        yield from (one.in_words for one in self.runs)
+        yield from (run.in_words for run in self.runs)
         yield self._data
         if self.effects:
-            alone = [one for one in self.effects if one.seen and not one.confused_with]
+            alone = [effect for effect in self.effects if effect.seen and not effect.confused_with]
             yield f"This motion shows {len(alone)} of {len(self.effects)} effects alone, each in its usual size."
             if alike := [one.name for one in self.effects if one.confused_with]:
                 yield f"Not separable from others by it: {', '.join(alike)}."
@@ -213,7 +213,7 @@ class RunCheck(Declared, PlottedResult):
         return (*self.findings, *self.advice)
 
     def _panels(self) -> list[Panel]:
-        names = tuple(one.name for one in self.effects)
+        names = tuple(effect.name for effect in self.effects)
         sizes = Series("", np.array([one.detectability for one in self.effects], dtype=float))
         return [
             Panel("detectability of effects of usual size", "d′, standard deviations", (sizes,), names, scale="zero")
@@ -309,7 +309,7 @@ def _effects(runs: Sequence[Run], model: WorldModel) -> tuple[EffectView, ...]:
         names.append(name)
     signatures, contenders = plan_contenders(model, names, duration=duration, sample_rate=1.0 / period, runs=len(runs))
     # Of either sign, which only makes effects look more alike: fits of one sign would take ten times as long.
-    contenders = [replace(one, positive=np.zeros_like(one.positive)) for one in contenders]
+    contenders = [replace(contender, positive=np.zeros_like(contender.positive)) for contender in contenders]
     found = distinguishability(normal_equations(stretches, point, signatures)[0], contenders)
     order = np.argsort(-found.detectability)
     return tuple(
@@ -327,13 +327,13 @@ def _rivals(found: Distinguishability, place: int) -> list[str]:
     if found.detectability[place] < Policy().seen:
         return []
     close = found.nats[place] < SEPARATED
-    return [name for number, name in enumerate(found.effects) if close[number] and number != place]
+    return [name for index, name in enumerate(found.effects) if close[index] and index != place]
 
 
 def _advice(runs: Sequence[CheckedRun], effects: Sequence[EffectView], useful: UsefulRun) -> list[str]:
     """Return what one more recording should be."""
     advice = []
-    if math.ceil(sum(one.duration_s for one in runs)) < useful.duration:
+    if math.ceil(sum(run.duration_s for run in runs)) < useful.duration:
         advice.append(f"record longer: {useful.duration:.0f} s at least, a minute is better")
     turns = [one.turns for one in runs if one.turns is not None]
     ways = {
@@ -341,7 +341,7 @@ def _advice(runs: Sequence[CheckedRun], effects: Sequence[EffectView], useful: U
         "backwards": [one.share_backwards for one in runs],
         "rest": [one.share_at_rest for one in runs],
     }
-    missing = [way for way, shares in ways.items() if not any((one or 0.0) > useful.share for one in shares)]
+    missing = [way for way, shares in ways.items() if not any((share or 0.0) > useful.share for share in shares)]
     if missing and missing[0] != "rest":
         advice.append(
             f"{'turn' if turns else 'move'} {missing[0]} as well: what goes with the rate and with its size can't be "
@@ -351,11 +351,11 @@ def _advice(runs: Sequence[CheckedRun], effects: Sequence[EffectView], useful: U
         advice.append("make several whole turns one way: an axis out of level and ripples show once per turn")
     if "rest" in missing:
         advice.append("begin with a few seconds of rest: biases are seen there")
-    unseen = [one for one in effects if not one.seen or one.confused_with]
+    unseen = [effect for effect in effects if not effect.seen or effect.confused_with]
     remedies = dict.fromkeys(one.remedy for one in unseen if one.remedy)
     advice += [f"{remedy}, for {', '.join(_of(unseen, remedy))}" for remedy in list(remedies)[:4]]
     return advice
 
 
 def _of(effects: Sequence[EffectView], remedy: str) -> list[str]:
-    return [one.name for one in effects if one.remedy == remedy]
+    return [effect.name for effect in effects if effect.remedy == remedy]

@@ -95,7 +95,7 @@ def _unsigned(gram: NDArray[np.float64], score: NDArray[np.float64]) -> NDArray[
 def _signed(gram: NDArray[np.float64], score: NDArray[np.float64], positive: NDArray[np.bool_]) -> NDArray[np.float64]:
     count = len(score)
     values = np.empty(len(SCALES))
-    for place, scale in enumerate(SCALES):
+    for index, scale in enumerate(SCALES):
         matrix = gram * scale**2
         matrix.flat[:: count + 1] += 1.0
         factor, info = lapack.dpotrf(matrix, lower=1)
@@ -105,7 +105,7 @@ def _signed(gram: NDArray[np.float64], score: NDArray[np.float64], positive: NDA
         inverse, _ = lapack.dpotri(factor, lower=1)
         inverse = np.tril(inverse) + np.tril(inverse, -1).T
         mean = inverse @ (score * scale)
-        values[place] = 0.5 * float(half @ half) - float(np.log(factor.diagonal()).sum())
+        values[index] = 0.5 * float(half @ half) - float(np.log(factor.diagonal()).sum())
         for sign in np.flatnonzero(positive):
-            values[place] += float(log_ndtr(mean[sign] / np.sqrt(inverse[sign, sign]))) + np.log(2.0)
+            values[index] += float(log_ndtr(mean[sign] / np.sqrt(inverse[sign, sign]))) + np.log(2.0)
     return values

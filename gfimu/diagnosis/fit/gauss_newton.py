@@ -184,7 +184,7 @@ def _descend(stretches: Sequence[Stretch], point: Point, policy: Policy) -> tupl
 
 def _dear(linear: Linear) -> tuple[Jacobian | None, ...]:
     """Return the derivatives by drives that are dear to take anew: they serve as long as they keep their promise."""
-    each = (one.jacobian for one in linear.posteriors)
+    each = (posterior.jacobian for posterior in linear.posteriors)
     return tuple(jacobian if jacobian.predictions > _NARROW else None for jacobian in each)
 
 

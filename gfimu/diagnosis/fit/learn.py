@@ -58,7 +58,7 @@ def starting_point(stretches: Sequence[Stretch], spacing: float) -> Point:
     """
     if stretches and isinstance(stretches[0], BodyStretch):
         bodies = [one for one in stretches if isinstance(one, BodyStretch)]
-        hands = tuple(HandDrive.of(one) for one in bodies)
+        hands = tuple(HandDrive.of(body) for body in bodies)
         return learn_noise(stretches, Point((), hands, tuple(first_noise(one) for one in bodies)))
     drives = tuple(over_segments(lambda stretch: _by_reference(stretch, spacing), stretches))
     return Point((), drives, tuple(stretch.first_levels for stretch in stretches))
@@ -127,7 +127,7 @@ def learn_roughness(stretches: Sequence[Stretch], point: Point, rounds: int = 1)
             if jacobians is None:
                 raise
             break  # what was learnt last is as rough as can be solved
-        jacobians = [one.jacobian for one in linear.posteriors]
+        jacobians = [posterior.jacobian for posterior in linear.posteriors]
         moved = stepped(stretches, point, linear).drives
         drives = tuple(drive.relearned(one.covariance) for drive, one in zip(moved, linear.posteriors, strict=True))
         point = replace(point, drives=drives)
@@ -146,7 +146,7 @@ def sharpened(stretches: Sequence[Stretch], point: Point, policy: Policy) -> Poi
     now = linearise(stretches, point)
     drives = list(stepped(stretches, point, now).drives)
     acuities = [_acuity(*one) for one in zip(stretches, drives, point.levels, strict=True)]
-    best = [_log_evidence(one) for one in now.posteriors]
+    best = [_log_evidence(posterior) for posterior in now.posteriors]
     gaining = np.ones(len(drives), dtype=bool)
     found, excess = point, now.objective / observations - 1.0
     for _ in range(_HALVINGS):
@@ -216,7 +216,7 @@ def learn_noise(
         learnt = over_segments(lambda s, drive, one: learnt_noise(s, drive, point.causes, one), *rows)
         return replace(point, levels=tuple(learnt))
     linear = linearise(stretches, point, jacobians=jacobians)
-    lefts = [_left(stretch, point, linear, place) for place, stretch in enumerate(stretches)]
+    lefts = [_left(stretch, point, linear, index) for index, stretch in enumerate(stretches)]
     levels = list(point.levels)
     for run in {stretch.index for stretch in stretches}:
         mine = [place for place, stretch in enumerate(stretches) if stretch.index == run]

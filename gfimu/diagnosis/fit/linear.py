@@ -95,7 +95,7 @@ class Linear:
     @cached_property
     def log_noise(self) -> float:
         """−½ log det of the noise covariance: to compare points of different noise."""
-        return sum(one.observed.log_noise for one in self.posteriors)
+        return sum(posterior.observed.log_noise for posterior in self.posteriors)
 
 
 def of_causes(point: Point) -> ColumnsOf:

@@ -90,7 +90,7 @@ def each_apart(
     finally:
         for process in processes:
             process.end()
-    return [results[number] if number in results else here(item) for number, item in enumerate(items)]
+    return [results[index] if index in results else here(item) for index, item in enumerate(items)]
 
 
 def _split_off(work: Callable[[Item], Result], items: Sequence[Item], most: int) -> Iterator[_Apart]:

@@ -167,10 +167,10 @@ def rigid_figure(power: BandPower) -> str:
         axis = figure.subplots()
         axis.axhline(1.0, color=_NOISE, linestyle="--", label="noise")
         parts = ((power.spin, "spin"), (power.array, "whole array"), (power.chips, "single chips"))
-        for number, (values, label) in enumerate(parts):
+        for index, (values, label) in enumerate(parts):
             if np.isfinite(values).any():
                 axis.plot(
-                    power.frequency, values, color=css(chip_colour(number, on_paper=True)), linewidth=1.2, label=label
+                    power.frequency, values, color=css(chip_colour(index, on_paper=True)), linewidth=1.2, label=label
                 )
         axis.set_xscale("log")
         axis.set_yscale("log")

@@ -225,7 +225,7 @@ def _cause(diagnosis: Diagnosis, cause: NamedCause) -> Mapping[str, Any]:
     every = parameters = parameter_texts(cause, parameter_units(diagnosis, cause))
     # Of many parameters, those that stand out from their uncertainty are worth a line on the first screen.
     if len(parameters) > _MOST_PARAMETERS:
-        parameters = [one for one in parameters if one.significant] or parameters
+        parameters = [parameter for parameter in parameters if parameter.significant] or parameters
     return {
         "name": cause.effect,
         "summary": summary(diagnosis, cause),

@@ -123,7 +123,7 @@ def _notes(diagnosis: Diagnosis) -> str:
     lines = [f"# {headline(diagnosis)}", "", story(diagnosis), ""]
     for cause in diagnosis.causes:
         texts = parameter_texts(cause, parameter_units(diagnosis, cause))
-        sizes = "; ".join(f"{one.name} {one.value}" for one in texts if one.significant)
+        sizes = "; ".join(f"{text.name} {text.value}" for text in texts if text.significant)
         lines.append(f"- **{cause.effect}** {sizes} (probability {percent(cause.probability)})")
     lines += ["", "**Next.**", *[f"- {step}" for step in next_steps(diagnosis)]]
     return "\n".join(lines)

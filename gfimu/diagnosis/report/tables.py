@@ -40,7 +40,7 @@ def _cause_rows(found: Diagnosis) -> list[tuple[str, str, str]]:
     rows = []
     for cause in found.causes:
         texts = parameter_texts(cause, parameter_units(found, cause))
-        texts = [one for one in texts if one.significant] or texts
+        texts = [text for text in texts if text.significant] or texts
         rows += [(cause.effect, summary(found, cause), percent(cause.probability))]
         rows += [(f"  {one.name}", f"{one.value}{f' = {one.familiar}' if one.familiar else ''}", "") for one in texts]
     return rows

@@ -39,9 +39,9 @@ class Blocks:
         self._one = np.array([len(h.positive) == 1 for h in self.hypotheses])
         # The one-dimensional hypotheses in the columns, shape (P, count).
         self._mixing = np.zeros((len(screening.score), int(self._one.sum())))
-        for place, number in enumerate(np.flatnonzero(self._one)):
+        for index, number in enumerate(np.flatnonzero(self._one)):
             hypothesis = self.hypotheses[number]
-            self._mixing[hypothesis.signature.columns, place] = hypothesis.cause.mixing[:, 0]
+            self._mixing[hypothesis.signature.columns, index] = hypothesis.cause.mixing[:, 0]
         self._signs = np.array([bool(h.positive[0]) for h in self.hypotheses])[self._one]
         self.log_prior = np.array([h.cause.log_prior for h in self.hypotheses])
 
@@ -96,7 +96,7 @@ class Blocks:
 
     def nearest(self, cause: Cause) -> int:
         """Return the hypothesis nearest to a cause: the same effect and place, the most similar shape."""
-        same = [number for number, one in enumerate(self.hypotheses) if one.cause.key == cause.key]
+        same = [index for index, hypothesis in enumerate(self.hypotheses) if hypothesis.cause.key == cause.key]
         return min(same, key=lambda number: self.hypotheses[number].cause.apart(cause))
 
     def optima(self, cause: Cause, rest: Sequence[int]) -> list[int]:
@@ -105,7 +105,7 @@ class Blocks:
         The best is the first.
         """
         odds = self.log_odds_each(rest)
-        same = [number for number, one in enumerate(self.hypotheses) if one.cause.key == cause.key]
+        same = [index for index, hypothesis in enumerate(self.hypotheses) if hypothesis.cause.key == cause.key]
         same.sort(key=lambda number: -odds[number])
         causes = [self.hypotheses[number].cause for number in same]
         optimal = [all(mine.apart(other) > ALIKE for other in causes[:place]) for place, mine in enumerate(causes)]

@@ -89,8 +89,8 @@ def explain(
     reference = starting_point(stretches, policy.knots)
     starts = _started(stretches, reference, policy)
     found = []
-    for number, sets in enumerate(starts):
-        found.append(_searched(sets, partial(_report_part, progress, number, len(starts))))
+    for index, sets in enumerate(starts):
+        found.append(_searched(sets, partial(_report_part, progress, index, len(starts))))
         if found[-1].interrupted:
             break
     best = max(found, key=lambda one: one.best.log_posterior)
@@ -128,18 +128,18 @@ def _searched(sets: Sets, progress: Report) -> Explanation:
     """
     policy, fits, seen, last = sets.policy, 0, set[Key](), None
     try:
-        for number in range(policy.rounds):
-            progress(number / policy.rounds, _leading(sets.best))
+        for index in range(policy.rounds):
+            progress(index / policy.rounds, _leading(sets.best))
             before = sets.best
             last = (before.key, screen(sets.stretches, before.point))
-            _fit_leaders(sets, last[1], before, near=number > 0)
+            _fit_leaders(sets, last[1], before, near=index > 0)
             leader = prune(sets)
             if leader.key not in seen:
                 _fit_other_shapes(sets, leader)
             # While a set still grows its noise is that of the largest: a smaller one would pass for more noise.
             best = sets.best if policy.free_body and sets.best.key not in seen else prune(sets)
             fits += sets.count
-            if number > 0 and (best.key in seen or has_stalled(sets.stretches, before, best, policy)):
+            if index > 0 and (best.key in seen or has_stalled(sets.stretches, before, best, policy)):
                 break
             seen.add(best.key)
             try:

@@ -34,7 +34,7 @@ def spread_over_runs(runs: Sequence[int], most: int) -> list[int]:
     """
     chosen: list[int] = []
     for run in dict.fromkeys(runs):
-        mine = [place for place, number in enumerate(runs) if number == run]
+        mine = [index for index, number in enumerate(runs) if number == run]
         count = min(max(round(most * len(mine) / len(runs)), 1), len(mine))
         chosen += [mine[int(place)] for place in np.linspace(0, len(mine) - 1, count).round()]
     return chosen
@@ -88,7 +88,7 @@ def _over_all(
         raise np.linalg.LinAlgError("the stretches left out determine no drive")
     point = _with_residue(stretches, learn_noise(stretches, found.point), part.residue)
     sets = Sets(stretches, point, policy)
-    rivals = [one.causes for one in part.explanation.rivals[: policy.beam - 1]]
+    rivals = [rival.causes for rival in part.explanation.rivals[: policy.beam - 1]]
     report(0.8, "compare")
     sets.fit([point, *(replace(point, causes=causes) for causes in rivals)])
     return replace(part, explanation=explained(sets, prune(sets), 0))

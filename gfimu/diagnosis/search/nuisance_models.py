@@ -199,7 +199,7 @@ def _walking(stretches: Sequence[Stretch], point: Point, taken: _Taken, policy: 
     walk = walk_strength(stretches, point, policy)
     if not walk.is_likely(policy):
         return None
-    levels = tuple(NoiseLevels(one.white, one.flicker, walk.strength) for one in point.levels)
+    levels = tuple(NoiseLevels(level.white, level.flicker, walk.strength) for level in point.levels)
     return learn_noise(stretches, replace(point, levels=levels), taken)
 
 
@@ -216,7 +216,7 @@ class _Derivatives:
             return None
         if id(point) not in self._taken:  # the point is kept beside them, so that its identity lasts
             linear = linearise(self._stretches, point, responses=False)
-            self._taken[id(point)] = point, [one.jacobian for one in linear.posteriors]
+            self._taken[id(point)] = point, [posterior.jacobian for posterior in linear.posteriors]
         return self._taken[id(point)][1]
 
 
@@ -238,7 +238,7 @@ def _offers(stretches: Sequence[Stretch], known: Explanation, model: _Model, der
 
 
 def _most(offers: Sequence[_Offer]) -> float:
-    return max((one.worth for one in offers), default=-np.inf)
+    return max((offer.worth for offer in offers), default=-np.inf)
 
 
 def _start(

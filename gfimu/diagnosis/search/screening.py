@@ -100,7 +100,7 @@ def screen(stretches: Sequence[Stretch], point: Point, *, only: Collection[str] 
         numbers = np.concatenate([columns_of_run(s, array, stretch.index) for s in signatures])
         return Columns.together(parts).among(numbers, count)
 
-    jacobians = [one.jacobian for one in first.posteriors]
+    jacobians = [posterior.jacobian for posterior in first.posteriors]
     linear = linearise(stretches, point, columns, jacobians=jacobians)
     base = np.zeros(count)
     for cause in causes:
@@ -175,9 +175,9 @@ def hypotheses_of(signatures: Sequence[Signature], array: AccelerometerArray, ru
         # A pattern may be empty for few chips, as delays between chips are for one.
         patterns = [pattern for pattern in signature.family.patterns(array) if pattern.mixing.shape[1]]
         anew = len(signature.columns) > len(signature.family.sizes(array))
-        for number, pattern in enumerate(patterns):
+        for index, pattern in enumerate(patterns):
             # The freest place is as probable as all others together, which are equally so.
-            share = 1.0 / (min(len(patterns), 2) * (1 if number == 0 else len(patterns) - 1))
+            share = 1.0 / (min(len(patterns), 2) * (1 if index == 0 else len(patterns) - 1))
             prior = float(np.log(share * prior_of(signature.family, families) / signature.looks))
             mixing = mixing_of(pattern, runs) if anew else pattern.mixing
             cause = Cause(signature.family, pattern.name, mixing, signature.shape, np.zeros(mixing.shape[1]), prior)

@@ -97,7 +97,7 @@ class Sets:
         """Fit a set again from other starts, and keep what is more probable; a start that leads back is left there."""
         first = replace(self.policy, steps=FEW)
         looks = each_apart(lambda point: self._roughly(replace(point, exact=False), first), points)
-        others = [one for one in looks if one is not None and not _is_alike(one, self.found[one.key])]
+        others = [look for look in looks if look is not None and not _is_alike(look, self.found[look.key])]
         # What leads after a few steps is followed to its optimum.
         again = self._roughly(max(others, key=_posterior).point, self.policy) if others else None
         fits = [one for one in (again,) if one is not None and not _is_alike(one, self.found[one.key])]
@@ -159,7 +159,7 @@ def prune(sets: Sets) -> Fit:
         needed = sets.policy.cause_odds
         if len(best.causes) > 1:
             left = [cause.family.inexactness * max(by, 0.0) for cause, by in zip(best.causes, lost, strict=True)]
-            needed = sets.policy.extra_odds + sum(part for place, part in enumerate(left) if place != weakest and part)
+            needed = sets.policy.extra_odds + sum(part for index, part in enumerate(left) if index != weakest and part)
         fewer = without[weakest]
         if fewer is None or lost[weakest] >= needed:
             return best

@@ -159,8 +159,8 @@ class Drive:
         """Return minus half the gradient of the energy, shape (m,)."""
         bent = self.spline.bend(self.coefficients) / self.roughness**2
         out = np.zeros(self.spline.size)
-        for place, weight in enumerate(self.spline.stencil.T):
-            out[place : place + len(bent)] -= weight * bent
+        for index, weight in enumerate(self.spline.stencil.T):
+            out[index : index + len(bent)] -= weight * bent
         if np.isfinite(self.angle_std):
             out -= self.spline.angle_row(self.since) * (self._off() / self.angle_std)
         return out
@@ -237,8 +237,8 @@ class Drive:
                 np.add.at(data[j - i], first + i, rows[:, i] * weight * rows[:, j])
         drive = replace(self, coefficients=np.zeros(size))
         stencil = np.zeros((size, self.spline.intervals))
-        for place, one in enumerate(self.spline.stencil.T):
-            stencil[np.arange(self.spline.intervals) + place, np.arange(self.spline.intervals)] = one
+        for index, one in enumerate(self.spline.stencil.T):
+            stencil[np.arange(self.spline.intervals) + index, np.arange(self.spline.intervals)] = one
         for _ in range(rounds):
             bands = data + drive._precision_bands()
             root = cholesky_banded(bands, lower=True, check_finite=False)

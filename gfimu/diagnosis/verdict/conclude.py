@@ -312,7 +312,7 @@ def _by_contribution(
         "noise": lambda one: white * np.sqrt(max(1.0 - one["factor"] ** -2, 0.0)),
     }
     small = [one for one in faults if one.effect in sizes and float(sizes[one.effect](one.parameters)) < explained]
-    return (*(one for one in faults if one not in small), *inferred, *small)
+    return (*(fault for fault in faults if fault not in small), *inferred, *small)
 
 
 def _believed(explanation: Explanation, described: Described | None, *, unknown: bool) -> Fit:
@@ -329,7 +329,7 @@ def _extension(
     if unknown:
         carried = described is not None and described.carried is not None
         return (effects_of(believed.causes, array, 0) if carried else []), []
-    of_time = [one for one in believed.causes if is_of_one_recording(one.family) and not confirmed]
+    of_time = [cause for cause in believed.causes if is_of_one_recording(cause.family) and not confirmed]
     return effects_of([one for one in believed.causes if one not in of_time], array, 0), [one.name for one in of_time]
 
 

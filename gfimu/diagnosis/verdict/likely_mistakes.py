@@ -78,7 +78,7 @@ def likely_mistake(model: WorldModel, runs: Sequence[Run], predict: Predict) -> 
     if least > (1.0 - REMOVED) * before.squares:
         return None
     # Another order of the channels does as well as some other arrays: the plainest comes first.
-    text, after = next(one for one in options if one[1].squares <= least + NOISE)
+    text, after = next(option for option in options if option[1].squares <= least + NOISE)
     return LikelyMistake(text, before.rms, after.rms)
 
 
@@ -114,15 +114,15 @@ def _placed_otherwise(
         slopes.append(np.concatenate([predict(moved, run) for run in runs]) - base)  # (n, c)
     valid = np.concatenate([run.valid for run in runs])
     error = np.where(valid, np.concatenate([run.readings for run in runs]) - base, 0.0) / white
-    starts = np.cumsum([len(one) for one in predictions])[:-1]
-    for number, chip in enumerate(array.chips):
-        mine = array.chip_of_channel == number
+    starts = np.cumsum([len(prediction) for prediction in predictions])[:-1]
+    for index, chip in enumerate(array.chips):
+        mine = array.chip_of_channel == index
         design = np.stack([np.where(valid, slope / white, 0.0)[:, mine].ravel() for slope in slopes], axis=1)
         step = np.linalg.lstsq(design, error[:, mine].ravel(), rcond=1e-6)[0]  # numerical: an axis shows no height
         change = sum(part * slope for part, slope in zip(step, slopes, strict=True))
-        place = positions[number] + array.length_unit * step
+        place = positions[index] + array.length_unit * step
         placed = np.split(base + np.where(mine, change, 0.0), starts)
-        text = f"chip {chip.name} reads as if at {_in_metres(place)}, not at {_in_metres(positions[number])}"
+        text = f"chip {chip.name} reads as if at {_in_metres(place)}, not at {_in_metres(positions[index])}"
         yield text, _Misfit.of(runs, placed, white)
 
 
@@ -155,7 +155,7 @@ def _read_otherwise(
     changed = np.flatnonzero((its != mine) | (signs < 0.0))
     if not len(changed):
         return
-    starts = np.cumsum([len(one) for one in predictions])[:-1]
+    starts = np.cumsum([len(prediction) for prediction in predictions])[:-1]
     otherwise = np.split(predicted[:, its] * signs, starts)
     yield _order_in_words(array.channels, its, signs, changed), _Misfit.of(runs, otherwise, white)
 

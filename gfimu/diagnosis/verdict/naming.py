@@ -37,7 +37,7 @@ def probabilities(explanation: Explanation, policy: Policy) -> dict[str, float]:
     """Return the probability of each effect to be among the causes, over all sets and models that were fitted."""
     every = (explanation.nothing, *explanation.without.values(), *explanation.rivals, explanation.best)
     fits = [*{one.key: one for one in every}.values(), *explanation.elsewhere]
-    weight = softmax(np.array([one.log_posterior for one in fits]) / policy.temperature)
+    weight = softmax(np.array([fit.log_posterior for fit in fits]) / policy.temperature)
     names = frozenset().union(*(one.names for one in fits))
     summed = {name: sum(w for w, one in zip(weight, fits, strict=True) if name in one.names) for name in names}
     return {name: float(np.clip(value, 0.0, policy.most_certain)) for name, value in summed.items()}
@@ -48,12 +48,12 @@ def cause_parameters(cause: Cause, array: AccelerometerArray, run: int = 0) -> t
     parameters = cause.effect(array, run).parameters
     numbers = [key for key, value in parameters.items() if isinstance(value, float)]
     slopes = np.zeros((len(numbers), len(cause.coordinates)))
-    for place in range(len(cause.coordinates)):
+    for index in range(len(cause.coordinates)):
         step = 1e-4 * max(1.0, float(np.abs(cause.coordinates).max()))  # numerical
         moved = cause.coordinates.copy()
-        moved[place] += step
+        moved[index] += step
         other = cause.at(moved).effect(array, run).parameters
-        slopes[:, place] = [(_unwrapped(key, other[key], parameters[key]) - parameters[key]) / step for key in numbers]
+        slopes[:, index] = [(_unwrapped(key, other[key], parameters[key]) - parameters[key]) / step for key in numbers]
     variance = np.einsum("ik,kl,il->i", slopes, cause.covariance, slopes)
     std = {key: float(np.sqrt(max(v, 0.0))) for key, v in zip(numbers, variance, strict=True)}
     std |= {key: value for key, value in cause.shape_std.items() if key in parameters}
@@ -79,7 +79,7 @@ def mimics(explanation: Explanation, cause: Cause, policy: Policy) -> list[str]:
     screening = explanation.screening
     if screening is None:
         return []
-    mine = next((one for one in screening.signatures if one.family.name == cause.name), None)
+    mine = next((signature for signature in screening.signatures if signature.family.name == cause.name), None)
     if mine is None:
         return []
     vector = np.zeros(len(screening.score))
@@ -270,7 +270,7 @@ def contested(
 
 def channel_share(change: NDArray[np.float64], channels: Sequence[str]) -> dict[str, float]:
     """Return the rms per channel of what a cause changes, (n, c), m/s²."""
-    return {name: float(np.sqrt(np.mean(change[:, place] ** 2))) for place, name in enumerate(channels)}
+    return {name: float(np.sqrt(np.mean(change[:, index] ** 2))) for index, name in enumerate(channels)}
 
 
 def _sentence(cause: Cause, array: AccelerometerArray, share: Mapping[str, float]) -> str:

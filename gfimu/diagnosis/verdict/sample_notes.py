@@ -78,7 +78,7 @@ def with_reference_clock(
     )
     if corrected:
         text += " The extended twin does not hold this: it is of the aligned recording."
-    own = [one for one in diagnosis.causes if not _is_of_alignment(one, clock, policy.noise_stds)]
+    own = [cause for cause in diagnosis.causes if not _is_of_alignment(cause, clock, policy.noise_stds)]
     if diagnosis.causes and not own and diagnosis.verdict in ("explained", "ambiguous"):
         names = " or ".join(one.effect for one in diagnosis.causes)
         said = f"Beside that nothing is wrong: {names} would be within what the alignment is uncertain by."

@@ -87,7 +87,7 @@ def undetermined_sentence(combinations: tuple[Undetermined, ...]) -> str:
     if len(combinations) == 1:
         return f"These data can't determine one combination, which stays at zero: {combinations[0].text}."
     # One of each effect first: they say most.
-    first = list({one.effect: one for one in reversed(combinations)}.values())[::-1][:_LISTED]
+    first = list({combination.effect: combination for combination in reversed(combinations)}.values())[::-1][:_LISTED]
     named = "; ".join(one.text for one in first)
     return (
         f"These data can't determine {len(combinations)} combinations, which stay at zero with the standard "

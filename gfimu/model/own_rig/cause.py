@@ -116,7 +116,7 @@ class Cause:
     starts: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        keys = [one.key for one in self.parameters]
+        keys = [parameter.key for parameter in self.parameters]
         if not keys or len(set(keys)) < len(keys):
             raise InputError(f"cause {self.name!r}: needs parameters, each with a key of its own, not {keys}")
 
@@ -133,7 +133,7 @@ class Cause:
         InputError
             For a key that it does not have.
         """
-        valid = [one.key for one in self.parameters]
+        valid = [parameter.key for parameter in self.parameters]
         unknown = [key for key in parameters if key not in valid]
         if unknown:
             raise InputError(f"cause {self.name!r}: unknown parameter {unknown[0]!r}; valid: {', '.join(valid)}")
@@ -145,7 +145,7 @@ class Cause:
 
     def parameter_units(self, array: AccelerometerArray) -> Mapping[str, str]:
         """Return the unit of each parameter."""
-        return {one.key: one.unit for one in self.parameters}
+        return {parameter.key: parameter.unit for parameter in self.parameters}
 
     def patterns(self, array: AccelerometerArray) -> tuple[Pattern, ...]:
         """Return the places it can take: channels and chips of a cause of channels, one place otherwise."""

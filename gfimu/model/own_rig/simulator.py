@@ -75,7 +75,7 @@ class SimulatorModel:
 
     def __post_init__(self) -> None:
         names = [cause.name for cause in self.causes]
-        keys = [one.key for cause in self.causes if not cause.of_channels for one in cause.parameters]
+        keys = [parameter.key for cause in self.causes if not cause.of_channels for parameter in cause.parameters]
         for what, all_of in (("causes", names), ("parameters", keys)):
             twice = sorted({one for one in all_of if all_of.count(one) > 1})
             if twice:
@@ -163,7 +163,7 @@ class SimulatorModel:
 
     def to_toml(self) -> str:
         """Return a twin file: where the simulation is, and the effects that it has."""
-        effects = [{"name": one.name, "parameters": one.parameters} for one in self.effects]
+        effects = [{"name": effect.name, "parameters": effect.parameters} for effect in self.effects]
         return tomli_w.dumps({"simulator": self.source, "effect": effects})
 
 

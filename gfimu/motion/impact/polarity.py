@@ -47,9 +47,9 @@ def sign_remark(zeroed: Recording, array: AccelerometerArray, motion: Estimate) 
     if misfit < _MISFIT:
         return ""
     reversals = {}
-    for number, name in enumerate(array.channels):
+    for index, name in enumerate(array.channels):
         readings = zeroed.readings.copy()
-        readings[:, number] *= -1.0
+        readings[:, index] *= -1.0
         reversals[name] = _misfit(readings, array, moved(replace(zeroed, readings=readings), array))
     best = min(reversals.values())
     if best * _BETTER > misfit:

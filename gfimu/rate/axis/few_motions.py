@@ -33,9 +33,9 @@ def few_motions_text(array: AccelerometerArray, sample_rate: float) -> str:
     resolution = inverse @ array.regression_matrix * (scale / scale[:, None])
     std = np.sqrt(inverse**2 @ noise**2)
     given = [
-        f"{name} (σ {std[place]:.2g} {_UNITS[place // 3]})" if np.isfinite(std[place]) else name
-        for place, name in enumerate(MOTION_NAMES)
-        if np.allclose(resolution[place], np.eye(6)[place], atol=1e-6)
+        f"{name} (σ {std[index]:.2g} {_UNITS[index // 3]})" if np.isfinite(std[index]) else name
+        for index, name in enumerate(MOTION_NAMES)
+        if np.allclose(resolution[index], np.eye(6)[index], atol=1e-6)
     ]
     whole = [chip.name for chip in array.chips if np.linalg.matrix_rank(chip.axes) == 3]
     if whole:

@@ -359,7 +359,7 @@ def _learnt(
         guess.append(settings.inclination)
         spans.append(0.1)
     simplex = np.array(
-        [guess, *(np.array(guess) + np.eye(len(guess))[place] * span for place, span in enumerate(spans))]
+        [guess, *(np.array(guess) + np.eye(len(guess))[index] * span for index, span in enumerate(spans))]
     )
     found = minimize(
         lambda values: -problem.likelihood(of(values), start, covariance, samples),

@@ -207,10 +207,10 @@ class LiveAxisFilter:
     def _step(self, t: float, readings: NDArray[np.float64]) -> AxisSample:
         """Take one sample with every motion that is followed."""
         followed, squares, count = [], 0.0, 0
-        for place, one in enumerate(self._followed):
+        for index, one in enumerate(self._followed):
             after, square, seen = self._advanced(one, t, readings)
             followed.append(after)
-            if place == 0:
+            if index == 0:
                 squares, count = square, seen
         if count:
             share = min((t - self._before) / self.settings.memory_s, 1.0)

@@ -100,8 +100,8 @@ class Mounting:
             ]
         none = np.zeros(3)
         found += [
-            Constant(f"{channel}_bias_m_s2", "bias", place, none, doubt.bias_std_m_s2)
-            for place, channel in enumerate(array.channels)
+            Constant(f"{channel}_bias_m_s2", "bias", index, none, doubt.bias_std_m_s2)
+            for index, channel in enumerate(array.channels)
         ]
         if free_inclination:
             found.append(Constant("inclination_rad", "inclination", 0, none, _FREE_TILT))
@@ -110,7 +110,7 @@ class Mounting:
     @property
     def prior_std(self) -> NDArray[np.float64]:
         """Standard deviations of the priors, shape (m,)."""
-        return np.array([one.std for one in self.constants])
+        return np.array([constant.std for constant in self.constants])
 
     def channels(self, values: NDArray[np.float64]) -> AxisChannels:
         """Return what the channels read where the constants have given values, shape (m,)."""
@@ -145,12 +145,12 @@ class Mounting:
         force, gravity = np.zeros((m, c, 3)), np.zeros((m, 2))
         acceleration, square, offset = np.zeros((m, c)), np.zeros((m, c)), np.zeros((m, c))
         tilt = self.tilt(values)
-        for place, one in enumerate(self.constants):
-            if one.kind == "inclination":
-                gravity[place] = STANDARD_GRAVITY * np.array([-np.sin(tilt), np.cos(tilt)])
+        for index, constant in enumerate(self.constants):
+            if constant.kind == "inclination":
+                gravity[index] = STANDARD_GRAVITY * np.array([-np.sin(tilt), np.cos(tilt)])
                 continue
             step = np.zeros(m)
-            step[place] = _STEP
+            step[index] = _STEP
             above, below = self.channels(values + step), self.channels(values - step)
             for slope, name in (
                 (force, "force"),
@@ -158,7 +158,7 @@ class Mounting:
                 (square, "by_square"),
                 (offset, "offset"),
             ):
-                slope[place] = (getattr(above, name) - getattr(below, name)) / (2.0 * _STEP)
+                slope[index] = (getattr(above, name) - getattr(below, name)) / (2.0 * _STEP)
         return Slopes(force, acceleration, square, offset, gravity)
 
 
@@ -166,6 +166,6 @@ def _across(direction: NDArray[np.float64]) -> list[tuple[str, NDArray[np.float6
     """Return two directions across the axis with their names: body axes where the axis is one, else e1 and e2."""
     along = int(np.argmax(np.abs(direction)))
     if np.isclose(abs(direction[along]), 1.0):
-        return [("xyz"[place], np.eye(3)[place]) for place in range(3) if place != along]
+        return [("xyz"[index], np.eye(3)[index]) for index in range(3) if index != along]
     frame = axis_frame(direction)
     return [("e1", frame[1]), ("e2", frame[2])]

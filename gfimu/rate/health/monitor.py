@@ -258,9 +258,9 @@ class ChannelMonitor:
         used, information, score = self.follower.evidence()
         late = waited * self.block_s >= policy.wait_s
         kinds = list(explanations(information, score, self.watched, self.array.chip_of_channel, policy.tried))
-        for number, kind in enumerate(kinds):
+        for index, kind in enumerate(kinds):
             # What more channels would explain beyond it, a set leaves unexplained.
-            more = max((entry.statistic for other in kinds[number + 1 :] for entry in other), default=0.0)
+            more = max((entry.statistic for other in kinds[index + 1 :] for entry in other), default=0.0)
             explains = [
                 more - entry.statistic < max(policy.unexplained, self._inexact(used, entry) * more)
                 and self._explains(place, used, entry)

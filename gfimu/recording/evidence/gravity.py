@@ -45,8 +45,8 @@ def gravity_text(recording: Recording, array: AccelerometerArray, limits: PartLi
     """
     readings = recording.for_array(array)
     chips = array.chip_of_channel
-    for number, chip in enumerate(array.chips):
-        own = chips == number
+    for index, chip in enumerate(array.chips):
+        own = chips == index
         if np.linalg.matrix_rank(chip.axes) < 3:
             continue
         force = readings[:, own] @ np.linalg.pinv(chip.axes).T  # (n, 3)

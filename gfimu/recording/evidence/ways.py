@@ -92,15 +92,13 @@ def ways_to_read(evidence: Evidence) -> list[Otherwise]:
         sign[channel] = -1.0
         text = f"channel {name} is inverted; change the sign of its column, or of its axis in the array file"
         ways.append(Otherwise("sign", text, np.diag(sign), channels=(name,)))
-    for number, chip in enumerate(array.chips):
+    for index, chip in enumerate(array.chips):
         if len(chip.axes) > 1:
             text = (
                 f"all channels of chip {chip.name} are inverted; "
                 "change the sign of its columns, or of its axes in the array file"
             )
-            ways.append(
-                Otherwise("sign", text, np.diag(np.where(chip_of == number, -1.0, 1.0)), channels=chip.channels)
-            )
+            ways.append(Otherwise("sign", text, np.diag(np.where(chip_of == index, -1.0, 1.0)), channels=chip.channels))
     ways.append(Otherwise("sign", "all channels are inverted; change the sign of all columns", -identity, channels=()))
     for one, two in combinations(range(count), 2):
         order = np.arange(count)

@@ -53,7 +53,7 @@ def nanoseconds_of(values: NDArray[Any] | Sequence[Any]) -> tuple[NDArray[np.int
         if parts.null_count > len(parts) // 2:
             return np.zeros(len(texts), dtype=np.int64), known
     known = parts.is_valid().to_numpy(zero_copy_only=False)
-    found = {parts.type.field(place).name: column for place, column in enumerate(parts.flatten())}
+    found = {parts.type.field(index).name: column for index, column in enumerate(parts.flatten())}
 
     def number(name: str) -> NDArray[np.int64]:
         """Return a part as whole numbers; 0 where it is not there."""

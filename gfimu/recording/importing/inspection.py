@@ -99,7 +99,7 @@ class Inspection(Declared, TableResult):
             key: np.array([getattr(one, key) for one in self.columns]) for key in ("least", "median", "most", "missing")
         }
         return {
-            "column": text_column(one.name for one in self.columns),
+            "column": text_column(column.name for column in self.columns),
             **numbers,
             "role": text_column(one.role for one in self.columns),
         }

@@ -107,7 +107,7 @@ def piece_of(raw: RawFile, chosen: ColumnMap) -> Piece:
 def combined_file(files: Sequence[RawFile], chosen: ColumnMap) -> RawFile | None:
     """Return one file with the tables of several, named by file, where the map names all but the first; None else."""
     named = _tables_named(chosen)
-    names = [Path(one.source).name for one in files]
+    names = [Path(file.source).name for file in files]
     if len(files) < 2 or not all(any(name.endswith(one) for one in named) for name in names[1:]):
         return None
     tables = {
@@ -150,7 +150,7 @@ def _filled(
         values = table.columns[name]
         kept = np.array([one not in (None, "") for one in values]) if values.dtype == object else ~np.isnan(values)
     else:
-        names = [name for one in columns if (name := table.find(one)) is not None]
+        names = [name for column in columns if (name := table.find(column)) is not None]
         known = np.any([np.isfinite(table.numbers(name)) for name in names], axis=0)
         kept = np.arange(len(table)) <= np.max(np.flatnonzero(known), initial=-1)
     return replace(table, columns={name: values[kept] for name, values in table.columns.items()})

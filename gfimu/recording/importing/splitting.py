@@ -41,11 +41,11 @@ def split_file(raw: RawFile, column: str | int, source: str, *, wanted: Collecti
             raise InputError(
                 f"{source}: split_by = {column!r} would make {len(values)} tables; give the column that names the chip"
             )
-        for number, value in enumerate(values):
-            rows = places == number
+        for index, value in enumerate(values):
+            rows = places == index
             columns = {key: one[rows] for key, one in table.columns.items() if key != name}
             key = f"{name}={value}"
-            tables[key] = RawTable(key, columns, table.notes if number == 0 else (), table.named, table.preamble)
+            tables[key] = RawTable(key, columns, table.notes if index == 0 else (), table.named, table.preamble)
     if not tables:
         listed = ", ".join(repr(name) for table in raw.tables.values() for name in list(table.columns)[:12])
         raise InputError(f"{source}: no column {column!r} to split by; the file has {listed}")
@@ -88,7 +88,7 @@ def _values(table: RawTable, name: str, wanted: Collection[str] = ()) -> tuple[l
     values, places, counts = np.unique(texts, return_inverse=True, return_counts=True)
     named = np.array([any(f"{name}={value}".lower().endswith(one.lower()) for one in wanted) for value in values])
     usual = ((counts >= _LEAST_SHARE * counts.max()) | named) & (values != "")
-    order = [place for place in range(len(values)) if usual[place]]
+    order = [index for index in range(len(values)) if usual[index]]
     if all(re.fullmatch(r"-?\d+", values[place]) for place in order):
         order.sort(key=lambda place: int(values[place]))
     number = np.full(len(values), -1)

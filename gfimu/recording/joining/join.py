@@ -354,8 +354,8 @@ def _levers(recording: Recording, found: Alignment, noisy: float) -> tuple[dict[
     The centripetal part points to the axis, the tangential one across it: they have one length and a right angle.
     """
     groups: dict[str, list[int]] = {}
-    for place, name in enumerate(recording.channels):
-        groups.setdefault(name[:-1], []).append(place)
+    for index, name in enumerate(recording.channels):
+        groups.setdefault(name[:-1], []).append(index)
     levers, differ = {}, []
     for chip, places in groups.items():
         if len(places) != 3:

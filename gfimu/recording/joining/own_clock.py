@@ -62,5 +62,5 @@ def _without_hub(recording: Recording) -> Recording:
     combinations = null_space(array.axes.T)  # (c, c − rank)
     if not combinations.shape[1]:
         return recording
-    names = tuple(f"{number}d" for number in range(combinations.shape[1]))
+    names = tuple(f"{index}d" for index in range(combinations.shape[1]))
     return replace(recording, readings=recording.readings @ combinations, channels=names)

@@ -111,7 +111,7 @@ def refined(signals: Signals, offset: float, rate_error: float, most_rate_error:
         at = fit.start(float(at[_RATE]))
         fit = fit.weighted_at(at)
         starts = fit.best(fit.rates_around(at, clocks), _STARTS) if leaning else [at]
-        [at] = fit.best([fit.solved(one, clocks) for one in starts], 1)
+        [at] = fit.best([fit.solved(start, clocks) for start in starts], 1)
         fit = fit.weighted_at(at)
     return Refinement(fit, at)
 
@@ -389,9 +389,9 @@ class _Fit:
         steps = np.diag(self.scales(len(at)))[clocks]
         second = np.stack(
             [
-                (pulls(at + one, self.slopes(at + one, clocks)) - pulls(at - one, self.slopes(at - one, clocks)))
-                / (2.0 * one.sum())
-                for one in steps
+                (pulls(at + step, self.slopes(at + step, clocks)) - pulls(at - step, self.slopes(at - step, clocks)))
+                / (2.0 * step.sum())
+                for step in steps
             ]
         )  # (clocks, blocks, clocks)
         size = len(clocks)
@@ -451,8 +451,8 @@ class _Fit:
         quarter = np.minimum(((self.t / self.length + 0.5) * 4).astype(int), 3)
         around = self.y - self.counted * (self.y.sum(axis=0) / self.counts)
         worst = 1.0
-        for number in range(4):
-            mine = quarter == number
+        for index in range(4):
+            mine = quarter == index
             others = replace(self, counted=self.counted * ~mine[:, None], y=self.y * ~mine[:, None])
             missed = self.y[mine] - self.counted[mine] * (matrix[mine] @ others.coefficients(matrix)[0])
             inside = replace(self, counted=self.counted[mine], y=self.y[mine])

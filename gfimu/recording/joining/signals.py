@@ -215,5 +215,5 @@ def functions_of(rate: NDArray[np.float64], step: float) -> NDArray[np.float64]:
 def channel_groups(counted: NDArray[np.bool_]) -> Iterator[tuple[NDArray[np.bool_], NDArray[np.intp]]]:
     """Yield the rows that count, (n,), and the channels of which these count."""
     rows, group = np.unique(counted, axis=1, return_inverse=True)
-    for number, mine in enumerate(rows.T):
-        yield mine, np.flatnonzero(group.ravel() == number)
+    for index, mine in enumerate(rows.T):
+        yield mine, np.flatnonzero(group.ravel() == index)

@@ -39,5 +39,5 @@ def _rules(name: str) -> str:
 
 def _variables(theme: str, chips: int) -> str:
     colours = {name: css(colour) for name, colour in PAGE[theme].items()}
-    colours |= {f"chip-{number}": css(chip_colour(number, on_paper=theme == "light")) for number in range(chips)}
+    colours |= {f"chip-{index}": css(chip_colour(index, on_paper=theme == "light")) for index in range(chips)}
     return f":root {{ {' '.join(f'--{name}: {colour};' for name, colour in colours.items())} }}"

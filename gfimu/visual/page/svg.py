@@ -101,5 +101,5 @@ def themed(svg: str, chips: int) -> str:
         css(PAGE["light"][name]): name for name in ("card", "ink", "noise", "band", "before", "after", "spin-axis")
     }
     names[GRID] = "line"
-    names |= {css(chip_colour(number, on_paper=True)): f"chip-{number}" for number in range(chips)}
+    names |= {css(chip_colour(index, on_paper=True)): f"chip-{index}" for index in range(chips)}
     return re.sub(r"#[0-9a-f]{6}\b", lambda match: f"var(--{names[match[0]]})" if match[0] in names else match[0], svg)

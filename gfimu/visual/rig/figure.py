@@ -77,8 +77,8 @@ def array_figure(
             panel.set_axisbelow(True)
     most = max(len(chip.axes) for chip in array.chips)
     handles = [
-        Line2D([], [], color=css(INK), linestyle=STYLES[number], label=f"sensing axis {number + 1} of a chip")
-        for number in range(most)
+        Line2D([], [], color=css(INK), linestyle=STYLES[index], label=f"sensing axis {index + 1} of a chip")
+        for index in range(most)
     ]
     if spin is not None:
         handles.append(Line2D([], [], color=css(SPIN_AXIS_ON_PAPER), linestyle="-.", label="axis of rotation"))
@@ -99,8 +99,8 @@ def _draw(panel: Axes, array: AccelerometerArray, view: NDArray[np.float64], spi
     for column, channel in enumerate(array.channels):
         _sensing_axis(panel, array, column, view, 0.42 * _axis_length(array, size), channel if names_channels else "")
     places = array.chip_positions @ view.T * _MM
-    for number, place in enumerate(places):
-        colour = css(chip_colour(number, on_paper=True))
+    for index, place in enumerate(places):
+        colour = css(chip_colour(index, on_paper=True))
         panel.plot(*place, "s", color=colour, markersize=7 if len(places) <= 16 else 5, markeredgecolor="white")
     length = 0.42 * _axis_length(array, size)
     arrows = (

@@ -56,10 +56,10 @@ def array_shapes(array: AccelerometerArray) -> Sequence[Shape]:
             (1.6 * chip, 1.6 * chip, chip),
             one.position.tolist(),
             _z_along(one.axes[2]) if len(one.axes) == 3 else turn,
-            chip_colour(number),
+            chip_colour(index),
             label=one.name,
         )
-        for number, one in enumerate(array.chips)
+        for index, one in enumerate(array.chips)
     ]
     return [body, *symbols]
 
@@ -73,7 +73,7 @@ def chip_names(array: AccelerometerArray) -> Names:
     return Names(
         array.chip_positions + 3.0 * chip * outwards,
         [one.name for one in array.chips],
-        [chip_colour(number) for number in range(len(array.chips))],
+        [chip_colour(index) for index in range(len(array.chips))],
     )
 
 

@@ -77,7 +77,7 @@ def run_legend(array: AccelerometerArray, *, estimate: bool, known: KnownMotion 
 **3-D.** {solid}{ghost}. {_CHIPS} Each thick arrow is as long as its channel reads, in m/s² ({size}). An arrow up at
 rest is right: a sensor at rest reads the reaction to gravity.
 
-**Colours.** {" ".join(one for one in colours if one)} {_HUES}
+**Colours.** {" ".join(colour for colour in colours if colour)} {_HUES}
 
 All plots are over the same time, in seconds; those of a run of up to a minute zoom together. Drag to move, scroll to
 zoom, double-click to see everything.

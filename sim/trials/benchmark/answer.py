@@ -128,4 +128,4 @@ def _missing(answers: Sequence[Answer]) -> list[Answer]:
 
 def write_answers(answers: Iterable[Answer], path: str | Path) -> None:
     """Write answers as lines of JSON, numbers to six digits, packed where the name ends in ``.xz``."""
-    write_lines(path, (msgspec.json.encode(six_digits(msgspec.to_builtins(one))).decode() for one in answers))
+    write_lines(path, (msgspec.json.encode(six_digits(msgspec.to_builtins(answer))).decode() for answer in answers))

@@ -240,9 +240,9 @@ class LinearLibrary:
             sizes = family.sizes(twin.array)
             for shape in _shapes(family, recording, residual) if sizes else ():
                 first = len(columns)
-                for number, size in enumerate(sizes):
+                for index, size in enumerate(sizes):
                     values = np.zeros(len(sizes))
-                    values[number] = _STEP * size.prior_std
+                    values[index] = _STEP * size.prior_std
                     effect = family.from_sizes(twin.array, values, shape)
                     moved = free.predicted(effect) if free else (drive.readings(effect) / white).ravel()
                     columns.append((moved - begun) / _STEP)
@@ -318,13 +318,13 @@ def stated_parameters(
         return np.array([found.value(key) for key in keys])
 
     found, slopes = values(sizes), np.zeros((len(keys), len(sizes)))
-    for place, std in enumerate(np.sqrt(np.maximum(np.diag(covariance), 0.0))):
+    for index, std in enumerate(np.sqrt(np.maximum(np.diag(covariance), 0.0))):
         if std > 0.0:
             moved = sizes.copy()
-            moved[place] += _SLOPE * std
+            moved[index] += _SLOPE * std
             change = values(moved) - found
             turned = [key == "phase_rad" for key in keys]  # a phase may jump by a turn
-            slopes[:, place] = np.where(turned, np.angle(np.exp(1j * change)), change) / (_SLOPE * std)
+            slopes[:, index] = np.where(turned, np.angle(np.exp(1j * change)), change) / (_SLOPE * std)
     stds = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", slopes, covariance, slopes), 0.0))
     least = {size.key: _SEEN * size.prior_std for size in family.sizes(array)}
     parameters = {
@@ -348,7 +348,7 @@ def fitted_sizes(recording: Recording, twin: Twin, effects: Sequence[Effect]) ->
         What the recording is known to have, near its true sizes and shapes.
     """
     array, drive = twin.array, FreeDrive(recording, twin)
-    sizes = [(number, place, size) for number, one in enumerate(effects) for place, size in enumerate(one.sizes(array))]
+    sizes = [(index, place, size) for index, one in enumerate(effects) for place, size in enumerate(one.sizes(array))]
     begun, columns = drive.predicted(*effects), []
     for number, place, size in sizes:
         values = effects[number].size_values(array)

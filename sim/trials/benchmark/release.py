@@ -170,13 +170,13 @@ def _made(set_name: str, split: str, generators: Iterable[str], hidden: Iterable
     rng = np.random.default_rng([1, list(SETS).index(set_name), SPLITS.index(split)])
     listed = list(zip(hidden, itertools.cycle(generators), strict=False))
     found = []
-    for number, place in enumerate(rng.permutation(len(listed))):
+    for index, place in enumerate(rng.permutation(len(listed))):
         effects, generator = listed[place]
         low, high = (150.0, 1500.0) if set_name == "unlisted" else (30.0, 3000.0)
         size = float(np.exp(rng.uniform(np.log(low), np.log(high))))
         sized = bool(effects) and not set(effects) <= SIZELESS
         found.append(
-            Case(set_name, split, number, generator, effects, size if sized else 0.0, _NOISE[number % len(_NOISE)])
+            Case(set_name, split, index, generator, effects, size if sized else 0.0, _NOISE[index % len(_NOISE)])
         )
     return found
 
@@ -222,7 +222,7 @@ def cases(set_name: str, split: str) -> tuple[Case, ...]:
     elif set_name == "dcmotor":
         made = _made("dcmotor", split, ["dcmotor"], _drawn("dcmotor", split, _ON_A_MOTOR, {1: 9, 0: 3}))
     else:
-        made = [Case("real", split, number, MEASURED) for number in range(2 if split == "test" else 0)]
+        made = [Case("real", split, index, MEASURED) for index in range(2 if split == "test" else 0)]
     return tuple(made)
 
 

@@ -226,7 +226,7 @@ class Judgement(Declared, PlottedResult):
 
     def shown(self) -> Iterator[Table | str]:
         """Yield a table per set, a column per method, and what the points mean."""
-        rows = [one.cells() for one in self.summaries]
+        rows = [summary.cells() for summary in self.summaries]
         for name in dict.fromkeys(row[0] for row in rows):
             first, *others = zip(COLUMNS[1:], *(row[1:] for row in rows if row[0] == name), strict=True)
             yield Table(name, first, others)
@@ -236,14 +236,14 @@ class Judgement(Declared, PlottedResult):
         return "Judged answers"
 
     def _shown(self) -> dict[str, NDArray[Any]]:
-        rows = [one.cells() for one in self.summaries]
-        return {name: text_column(row[place] for row in rows) for place, name in enumerate(COLUMNS)}
+        rows = [summary.cells() for summary in self.summaries]
+        return {name: text_column(row[index] for row in rows) for index, name in enumerate(COLUMNS)}
 
     def _notes(self) -> tuple[str, ...]:
         return (POINTS_NOTE, "intervals: 95 %")
 
     def _panels(self) -> list[Panel]:
-        sets = tuple(dict.fromkeys(one.set_name for one in self.summaries))
+        sets = tuple(dict.fromkeys(summary.set_name for summary in self.summaries))
         series = []
         for method in dict.fromkeys(one.method for one in self.summaries):
             by_set = {one.set_name: (one.points, one.points_std) for one in self.summaries if one.method == method}

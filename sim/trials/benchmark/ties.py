@@ -62,9 +62,9 @@ class _Observer:
         """Return the derivative by each size of a kind of effect, (n (c + 1), m)."""
         array, sizes = self._twin.array, family.sizes(self._twin.array)
         found = []
-        for number, size in enumerate(sizes):
+        for index, size in enumerate(sizes):
             values = np.zeros(len(sizes))
-            values[number] = _STEP * size.prior_std
+            values[index] = _STEP * size.prior_std
             found.append((self._predict((family.from_sizes(array, values, shape),)) - self._nominal) / _STEP)
         return np.column_stack(found)
 
@@ -98,7 +98,7 @@ def free_distance_and_ties(world: World, tacho_noise: float, least: float) -> tu
         return float("nan"), {}
     warm = recording.reference["temperature_degC"]
     observer = _Observer(twin, world.motion, recording.t_s, warm, tacho_noise)
-    signatures = np.column_stack([observer.signature(one) for one in effects])
+    signatures = np.column_stack([observer.signature(effect) for effect in effects])
     seen = float(np.linalg.norm(signatures, axis=0).min())
     ties: dict[str, list[str]] = {one.name: [] for one in effects}
     for rival, family in twin.families().items() if seen >= least else ():

@@ -85,6 +85,6 @@ def _as_cause(effect: Effect, world: HiddenWorld, found: Explanation) -> Cause:
 def _log_prior(found: Explanation, name: str, place: str) -> float:
     """Return the prior that the search gives an effect at a place."""
     assert found.screening is not None  # nothing interrupted it
-    priors = {one.cause.key: one.cause.log_prior for one in found.screening.hypotheses}
+    priors = {hypothesis.cause.key: hypothesis.cause.log_prior for hypothesis in found.screening.hypotheses}
     known: Mapping[tuple[str, str], float] = {**priors, **{cause.key: cause.log_prior for cause in found.best.causes}}
     return known.get((name, place), min(priors.values()))

@@ -129,8 +129,8 @@ def _singles() -> list[Case]:
     pairs = [(name, size) for name in EFFECTS if name not in SIZELESS for size in SIZES]
     pairs += [(name, 0.0) for name in SIZELESS for _ in SIZES]
     return [
-        Case("singles", 10_000 + number, (name,), size, **_noise_of(number // 5 + number))
-        for number, (name, size) in enumerate(itertools.chain(pairs, pairs))
+        Case("singles", 10_000 + index, (name,), size, **_noise_of(index // 5 + index))
+        for index, (name, size) in enumerate(itertools.chain(pairs, pairs))
     ]
 
 
@@ -138,13 +138,13 @@ def _fresh_singles() -> list[Case]:
     """Return single effects of any size in runs of 40 to 60 s: seeds on which nothing was developed."""
     rng = np.random.default_rng(95_000)
     cases = []
-    for number in range(140):
-        name = list(EFFECTS)[number % len(EFFECTS)]
+    for index in range(140):
+        name = list(EFFECTS)[index % len(EFFECTS)]
         size = float(np.exp(rng.uniform(np.log(SIZES[0]), np.log(SIZES[-1]))))
         duration = float(rng.choice([40.0, 50.0, 60.0]))
-        noise = _noise_of(number // len(EFFECTS) + number)
+        noise = _noise_of(index // len(EFFECTS) + index)
         hidden = 0.0 if name in SIZELESS else size
-        cases.append(Case("fresh_singles", 95_000 + number, (name,), hidden, duration=duration, **noise))
+        cases.append(Case("fresh_singles", 95_000 + index, (name,), hidden, duration=duration, **noise))
     return cases
 
 
@@ -152,8 +152,8 @@ def _faint() -> list[Case]:
     """Return sizes about the least that can be seen, where what is said is less certain."""
     names = [name for name in EFFECTS if name not in SIZELESS]
     return [
-        Case("faint", 15_000 + number, (name,), size, **_noise_of(number))
-        for number, (size, name) in enumerate(itertools.product(_FAINT_SIZES, names))
+        Case("faint", 15_000 + index, (name,), size, **_noise_of(index))
+        for index, (size, name) in enumerate(itertools.product(_FAINT_SIZES, names))
     ]
 
 
@@ -165,12 +165,12 @@ def _fresh_faint() -> list[Case]:
     return [
         Case(
             "fresh_faint",
-            96_000 + number,
-            (names[number % len(names)],),
+            96_000 + index,
+            (names[index % len(names)],),
             float(size),
-            **_noise_of(number // 3 + number),
+            **_noise_of(index // 3 + index),
         )
-        for number, size in enumerate(sizes)
+        for index, size in enumerate(sizes)
     ]
 
 
@@ -179,12 +179,12 @@ def _coarse_steps() -> list[Case]:
     return [
         Case(
             "coarse_steps",
-            993_000 + number,
+            993_000 + index,
             ("coarse_resolution",),
-            duration=(40.0, 50.0, 60.0)[number % 3],
+            duration=(40.0, 50.0, 60.0)[index % 3],
             bias_instability_mg=0.5,
         )
-        for number in range(36)
+        for index in range(36)
     ]
 
 
@@ -196,9 +196,9 @@ def _other_settings() -> list[Case]:
     cases = []
     for first, count in ((995_000, 60), (996_000, 40)):
         rng = np.random.default_rng(first)
-        for number in range(count):
+        for index in range(count):
             name = list(EFFECTS)[int(rng.integers(len(EFFECTS)))]
-            cases.append(_at_other_settings("other_settings", first + number, (name,), rng))
+            cases.append(_at_other_settings("other_settings", first + index, (name,), rng))
     return cases
 
 
@@ -210,13 +210,13 @@ def _other_pairs() -> list[Case]:
     """
     rng = np.random.default_rng(872_000)
     drawn = ((tuple(str(name) for name in rng.choice(list(EFFECTS), 2, replace=False))) for _ in range(50))
-    return [_at_other_settings("other_pairs", 872_000 + number, names, rng) for number, names in enumerate(drawn)]
+    return [_at_other_settings("other_pairs", 872_000 + index, names, rng) for index, names in enumerate(drawn)]
 
 
 def _other_nulls() -> list[Case]:
     """Return runs with nothing hidden at such settings."""
     rng = np.random.default_rng(871_000)
-    return [_at_other_settings("other_nulls", 871_000 + number, (), rng) for number in range(60)]
+    return [_at_other_settings("other_nulls", 871_000 + index, (), rng) for index in range(60)]
 
 
 def _at_other_settings(study: str, seed: int, effects: tuple[str, ...], rng: np.random.Generator) -> Case:
@@ -231,20 +231,20 @@ def _at_other_settings(study: str, seed: int, effects: tuple[str, ...], rng: np.
 
 def _nulls() -> list[Case]:
     return [
-        Case("nulls", 20_000 + 1000 * level + number, **_noise_of(level)) for number in range(200) for level in range(3)
+        Case("nulls", 20_000 + 1000 * level + index, **_noise_of(level)) for index in range(200) for level in range(3)
     ]
 
 
 def _long_nulls() -> list[Case]:
     """Return long runs with nothing hidden: bias instability over minutes looks like a drift."""
-    return [Case("long_nulls", 69_000 + number, duration=600.0, **_noise_of(number)) for number in range(24)]
+    return [Case("long_nulls", 69_000 + index, duration=600.0, **_noise_of(index)) for index in range(24)]
 
 
 def _threshold_nulls() -> list[Case]:
     """Return runs on which the thresholds may be chosen; the figures come from ``nulls`` alone."""
     return [
-        Case("threshold_nulls", 25_000 + 1000 * level + number, **_noise_of(level))
-        for number in range(100)
+        Case("threshold_nulls", 25_000 + 1000 * level + index, **_noise_of(level))
+        for index in range(100)
         for level in range(3)
     ]
 
@@ -253,10 +253,10 @@ def _drawn_sets(study: str, first_seed: int, count: int, members: int) -> list[C
     rng = np.random.default_rng(first_seed)
     names = list(EFFECTS)
     cases = []
-    for number in range(count):
+    for index in range(count):
         drawn = tuple(str(name) for name in rng.choice(names, size=members, replace=False))
         size = float(np.exp(rng.uniform(np.log(60.0), np.log(1500.0))))
-        cases.append(Case(study, first_seed + number, drawn, size, **_noise_of(number)))
+        cases.append(Case(study, first_seed + index, drawn, size, **_noise_of(index)))
     return cases
 
 
@@ -269,7 +269,7 @@ def _triples() -> list[Case]:
 
 
 def _residue() -> list[Case]:
-    cases = [Case("residue", 50_000 + number, residue=True, **_noise_of(number)) for number in range(30)]
+    cases = [Case("residue", 50_000 + index, residue=True, **_noise_of(index)) for index in range(30)]
     names = [name for name in EFFECTS if name not in SIZELESS]
     return cases + [
         Case("residue", 50_100 + number, (name,), size, residue=True, **_noise_of(number))
@@ -284,24 +284,24 @@ def _elsewhere(study: str, first_seed: int, settings: Mapping[str, Any], count: 
     library = [name for name in EFFECTS if name not in left_out]
     order = [str(name) for name in rng.permutation(library)]
     cases = []
-    for number in range(count):
-        hidden = () if number % 3 == 0 else (order[number % len(order)],)
+    for index in range(count):
+        hidden = () if index % 3 == 0 else (order[index % len(order)],)
         size = float(rng.choice([60.0, 300.0, 1500.0])) if hidden and hidden[0] not in SIZELESS else 0.0
-        cases.append(Case(study, first_seed + number, hidden, size, **{**_noise_of(number), **settings}))
+        cases.append(Case(study, first_seed + index, hidden, size, **{**_noise_of(index), **settings}))
     return cases
 
 
 def _left_out() -> list[Case]:
     return [
-        Case("left_out", 80_000 + number, (name,), size, without=name, **_noise_of(number))
-        for number, (size, name) in enumerate(itertools.product((60.0, 200.0, 1000.0), _TAKEN_OUT))
+        Case("left_out", 80_000 + index, (name,), size, without=name, **_noise_of(index))
+        for index, (size, name) in enumerate(itertools.product((60.0, 200.0, 1000.0), _TAKEN_OUT))
     ]
 
 
 def _exotics() -> list[Case]:
     return [
-        Case("exotics", 90_000 + number, (name,), size, **_noise_of(number))
-        for number, (size, _, name) in enumerate(itertools.product((60.0, 200.0, 1000.0), range(2), EXOTICS))
+        Case("exotics", 90_000 + index, (name,), size, **_noise_of(index))
+        for index, (size, _, name) in enumerate(itertools.product((60.0, 200.0, 1000.0), range(2), EXOTICS))
     ]
 
 
@@ -317,15 +317,15 @@ def _free_body() -> list[Case]:
     """Return free bodies with a gyro: in turn nothing hidden, and every effect once at each of two sizes."""
     cases = []
     hidden = [(name, size) for size in (300.0, 1500.0) for name in _BODY_HIDDEN]
-    for number in range(len(hidden) * 3 // 2):
-        pair, step = divmod(number, 3)
-        setting = {"array": list(BODY_PARTS)[number % 2], "body": True, "duration": 20.0, **_noise_of(number)}
+    for index in range(len(hidden) * 3 // 2):
+        pair, step = divmod(index, 3)
+        setting = {"array": list(BODY_PARTS)[index % 2], "body": True, "duration": 20.0, **_noise_of(index)}
         if step == 0:
-            cases.append(Case("free_body", 85_000 + number, **setting))
+            cases.append(Case("free_body", 85_000 + index, **setting))
             continue
         name, size = hidden[2 * pair + step - 1]
         sized = name not in SIZELESS
-        cases.append(Case("free_body", 85_000 + number, (name,), size if sized else 0.0, **setting))
+        cases.append(Case("free_body", 85_000 + index, (name,), size if sized else 0.0, **setting))
     return cases
 
 

@@ -95,7 +95,7 @@ class Design:
 
     def _point(self, number: int) -> NDArray[np.float64]:
         """Return the coordinates of a combination, (k,): the number of a choice, or a place in [0, 1] of a range."""
-        ranges = np.array([isinstance(one, RangeTable) for one in self.plan.factors.values()])
+        ranges = np.array([isinstance(factor, RangeTable) for factor in self.plan.factors.values()])
         if self.plan.design == "grid":
             places = np.array(np.unravel_index(number, self._sizes), dtype=float)
             return np.where(ranges, places / np.maximum(np.array(self._sizes) - 1.0, 1.0), places)

@@ -93,7 +93,7 @@ def draw_over(axes: Axes, table: pa.Table, design: Design, name: str, values: Fl
     axes.set_xlabel(label(name))
     column = np.array(table[name].to_pylist(), dtype=object)[finite]
     levels = sorted(set(factor)) if not any(isinstance(one, str) for one in factor) else list(factor)
-    _draw_boxes(axes, [values[column == one] for one in levels], truth=truth)
+    _draw_boxes(axes, [values[column == level] for level in levels], truth=truth)
     texts = [f"{one:.3g}" if isinstance(one, float) else str(one) for one in levels]
     upright = max(map(len, texts)) * len(texts) < 3 * _LONGEST
     axes.set_xticks(range(len(texts)), texts, rotation=0 if upright else 30, ha="center" if upright else "right")
@@ -117,11 +117,11 @@ def _draw_bands(axes: Axes, x: Floats, y: Floats, *, truth: bool) -> None:
 
 def _draw_boxes(axes: Axes, groups: list[Floats], *, truth: bool) -> None:
     if truth:
-        for place, group in enumerate(groups):
+        for index, group in enumerate(groups):
             if len(group):
                 low, share, high = share_of(group)
                 error = [[share - low], [high - share]]
-                axes.errorbar(place, share, error, fmt="o", ms=4, color=css(AFTER_ON_PAPER), capsize=3)
+                axes.errorbar(index, share, error, fmt="o", ms=4, color=css(AFTER_ON_PAPER), capsize=3)
         axes.set_xlim(-0.5, len(groups) - 0.5)
         axes.set_ylim(-0.03, 1.03)
         return
@@ -152,8 +152,8 @@ def draw_shares(axes: Axes, found: Sequence[Sensitivity], seeds: float | None) -
         axes.barh(0, seeds, 0.6, color=css(NOISE_ON_PAPER))
         names.append("seeds")
     places = np.arange(len(names), len(names) + len(found))
-    for number, (name, values, highs, colour) in enumerate(kinds):
-        shift = height * (0.5 * (len(kinds) - 1) - number)
+    for index, (name, values, highs, colour) in enumerate(kinds):
+        shift = height * (0.5 * (len(kinds) - 1) - index)
         error = np.nan_to_num(np.subtract(highs, values))
         axes.barh(
             places + shift, np.maximum(values, 0.0), height, color=css(colour), label=name, xerr=error,

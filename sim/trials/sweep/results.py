@@ -192,7 +192,7 @@ class CampaignTable(Declared, PlottedResult):
         if not self.sensitivities:
             yield "no sensitivities: no factor varies, or too few combinations are done"
             return
-        rows = [one.row_text() for one in self.sensitivities]
+        rows = [sensitivity.row_text() for sensitivity in self.sensitivities]
         rows += [(result, "(seeds)", f"{share:.3f}", "", "") for result, share in self.seed_shares.items()]
         order = list(dict.fromkeys(row[0] for row in rows))
         rows.sort(key=lambda row: order.index(row[0]))
@@ -210,7 +210,7 @@ class CampaignTable(Declared, PlottedResult):
         return "Results of a campaign"
 
     def _facts(self) -> list[tuple[str, str]]:
-        finite = (one for one in self.sensitivities if math.isfinite(one.first))
+        finite = (sensitivity for sensitivity in self.sensitivities if math.isfinite(sensitivity.first))
         return [(f"share of {one.factor} in {one.result}", f"{100 * one.first:.3g} %") for one in finite]
 
     def _panels(self) -> list[Panel]:
@@ -261,7 +261,7 @@ def _group_panels(groups: Sequence[Group]) -> list[Panel]:
     for result, members in _by_result(groups).items():
         names = tuple(", ".join(f"{key} {value}" for key, value in one.values.items()) or "all" for one in members)
         series = tuple(
-            Series(label, np.array([getattr(one, key) for one in members], dtype=float), role=role)
+            Series(label, np.array([getattr(member, key) for member in members], dtype=float), role=role)
             for label, key, role in (
                 ("95 %", "high", "noise"),
                 ("median or share", "median", "after"),

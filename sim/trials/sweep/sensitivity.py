@@ -208,7 +208,7 @@ def _of_grid(values: Floats, which: NDArray[np.intp]) -> tuple[float, float]:
     if repeats == 1:
         return value, np.nan
     weights = np.random.default_rng(0).multinomial(repeats, np.full(repeats, 1.0 / repeats), _RESAMPLES) / repeats
-    return value, _Z95 * float(np.std([index(values @ one) for one in weights]))
+    return value, _Z95 * float(np.std([index(values @ weight) for weight in weights]))
 
 
 def _bootstrapped(moments: Floats, index: Callable[[Floats], Floats]) -> tuple[Floats, Floats]:

@@ -95,10 +95,10 @@ def response(calibration: Calibration, array: AccelerometerArray, position_std_m
     place = {name: row for row, name in enumerate(calibration.names)}
     place |= {} if fitted else {name: count + row for row, name in enumerate(moved)}
     by = np.zeros((size, 3, 13))  # of H, of the bias, and of the six products of ω
-    for number, chip in enumerate(placed.chips):
-        weights = alpha_rows[:, 3 * number : 3 * number + 3] @ calibration.models[chip.name].inverse  # (3, 3)
+    for index, chip in enumerate(placed.chips):
+        weights = alpha_rows[:, 3 * index : 3 * index + 3] @ calibration.models[chip.name].inverse  # (3, 3)
         sensed = chip.axes @ np.hstack([-_skew(chip.position), np.eye(3)])  # (3, 6)
-        drawn = alpha_rows[:, 3 * number : 3 * number + 3] @ chip.axes
+        drawn = alpha_rows[:, 3 * index : 3 * index + 3] @ chip.axes
         for row, i in enumerate("xyz"):
             by[place[f"{chip.name}_b_{i}"], :, 6] = weights[:, row]
             unit = np.eye(3)[row]

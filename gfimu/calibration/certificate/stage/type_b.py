@@ -115,7 +115,7 @@ def type_b(
             standard = np.zeros(len(wanted))
             if getattr(acting, key) > 0.0:
                 fits = calibrate_under(calibration, directions, draw_errors(acting, directions, runs, rng, (key,)))
-                off = np.array([figures(one.calibration) for one in fits]) - wanted  # (n, t)
+                off = np.array([figures(fit.calibration) for fit in fits]) - wanted  # (n, t)
                 standard = np.sqrt(np.mean(off**2, axis=0))
                 standard[standard < _ROUNDING * np.abs(wanted)] = 0.0
                 misfit += float(np.mean([one.misfit for one in fits]))

@@ -91,8 +91,8 @@ def chip_patterns(array: AccelerometerArray, mounting: NDArray[np.float64], comp
     fields = _fields(array, mounting, np.arange(count))
     unit = np.eye(components)
     found = [
-        (f"{name} on component {number + 1}", np.outer(field, one).ravel())
-        for number, one in enumerate(unit)
+        (f"{name} on component {index + 1}", np.outer(field, one).ravel())
+        for index, one in enumerate(unit)
         for name, field in fields
     ]
     if components == 3:
@@ -120,14 +120,14 @@ def pair_patterns(array: AccelerometerArray, pairs: Sequence[tuple[int, int]]) -
 
     What channel i picks up from j, j picks up from i with the other sign.
     """
-    place = {pair: number for number, pair in enumerate(pairs)}
+    place = {pair: index for index, pair in enumerate(pairs)}
     half = [(i, j) for i, j in pairs if i < j]
     turned = np.zeros((len(pairs), len(half)))
     for column, (i, j) in enumerate(half):
         turned[place[i, j], column], turned[place[j, i], column] = 1.0, -1.0
     chip = np.array([array.chip_of_channel[i] for i, _ in half])
     groups = [chip >= 0, *(chip == number for number in range(len(array.chips)))]
-    return [Pattern("axes that are turned, opposite in every pair", turned[:, one], common=False) for one in groups]
+    return [Pattern("axes that are turned, opposite in every pair", turned[:, group], common=False) for group in groups]
 
 
 def distinct(patterns: Sequence[Pattern], prior: NDArray[np.float64]) -> list[Pattern]:
@@ -137,8 +137,8 @@ def distinct(patterns: Sequence[Pattern], prior: NDArray[np.float64]) -> list[Pa
     """
     kept: list[Pattern] = []
     spans: list[NDArray[np.float64]] = []
-    for one in patterns:
-        columns = one.columns / prior[:, None]
+    for pattern in patterns:
+        columns = pattern.columns / prior[:, None]
         columns = columns[:, np.linalg.norm(columns, axis=0) > 0.0]
         if not columns.shape[1]:
             continue
@@ -149,7 +149,7 @@ def distinct(patterns: Sequence[Pattern], prior: NDArray[np.float64]) -> list[Pa
         if any(span.shape == left.shape and np.sum((span.T @ left) ** 2) > left.shape[1] - NOTHING for span in spans):
             continue
         spans.append(left)
-        kept.append(Pattern(one.name, columns / np.linalg.norm(columns, axis=0) * np.sqrt(used), one.common))
+        kept.append(Pattern(pattern.name, columns / np.linalg.norm(columns, axis=0) * np.sqrt(used), pattern.common))
     return kept
 
 
@@ -175,7 +175,7 @@ def _fields(
 
 def _groups(axis: NDArray[np.intp]) -> list[tuple[str, NDArray[np.bool_]]]:
     """Return groups of channels (c,), given the sensing axis of each."""
-    single = [(f"sensing axis {number + 1}", axis == number) for number in range(axis.max() + 1)]
+    single = [(f"sensing axis {index + 1}", axis == index) for index in range(axis.max() + 1)]
     return [("every channel", axis >= 0), *single, ("sensing axes 1 and 2", axis < 2)]
 
 

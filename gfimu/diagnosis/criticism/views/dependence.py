@@ -264,7 +264,7 @@ class _Regressions:
         out = _Regression(np.zeros(c), np.zeros(c), np.ones(c), np.zeros(c))
         if regressors and regressors[0].ndim == 2:
             for channel in range(c):
-                self._fill(out, np.array([channel]), [one[:, channel] for one in regressors])
+                self._fill(out, np.array([channel]), [regressor[:, channel] for regressor in regressors])
             return out
         for channels in self.groups:
             self._fill(out, np.array(channels), regressors)
@@ -297,7 +297,7 @@ class _Regressions:
         count = int(valid.sum())
         if count < _FEWEST_SAMPLES:
             return
-        columns = [np.where(valid, one - one[valid].mean(), 0.0) for one in regressors]
+        columns = [np.where(valid, regressor - regressor[valid].mean(), 0.0) for regressor in regressors]
         if any(not column.any() for column in columns):
             return
         design = dct(np.column_stack([valid.astype(float), *columns]), type=2, norm="ortho", axis=0)  # (n, k)
@@ -307,12 +307,12 @@ class _Regressions:
         pairs = [(i, j) for i in range(k) for j in range(i, k)]
         products = np.column_stack([design[:, i] * design[:, j] for i, j in pairs]).T @ weight  # (pairs, c)
         scores = design.T @ (weight * self.target[:, channels])  # (k, c)
-        for place, channel in enumerate(channels):
+        for index, channel in enumerate(channels):
             gram = np.empty((k, k))
-            for (i, j), value in zip(pairs, products[:, place], strict=True):
+            for (i, j), value in zip(pairs, products[:, index], strict=True):
                 gram[i, j] = gram[j, i] = value
             factor = np.linalg.cholesky(gram + 1e-9 * np.trace(gram) * np.eye(k))
-            half = np.linalg.solve(factor, scores[:, place])  # (k,): the first is the constant's
+            half = np.linalg.solve(factor, scores[:, index])  # (k,): the first is the constant's
             skipped = min(1, k - 1)
             explained = float(np.sum(half[skipped:] ** 2))
             left = max(float(self.power[channel]) - float(half @ half), 0.0)

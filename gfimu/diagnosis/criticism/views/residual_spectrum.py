@@ -165,7 +165,7 @@ def order_spectrum(
         return np.abs(rfft(total, axis=0))[shown]  # (m, c)
 
     scale = 2.0 / total_weight
-    old, new = (np.sqrt(np.mean((scale * spectrum(one))[:, alive] ** 2, axis=1)) for one in residuals)
+    old, new = (np.sqrt(np.mean((scale * spectrum(residual))[:, alive] ** 2, axis=1)) for residual in residuals)
     spread = np.sqrt(np.maximum(np.sum(weight**2, axis=0), 1e-300))
     first = int(np.searchsorted(orders[shown], _SLOWEST_ORDER))
     noise_scale = scale * spread * run.white

@@ -99,15 +99,15 @@ class ResidualViews:
     @property
     def strongest_order(self) -> Dependence | None:
         """The order of the table's angle that the residual follows most."""
-        orders = [one for one in self.dependences if one.view == "angle"]
-        spoken = [one for one in orders if one.sentence] or orders
+        orders = [dependence for dependence in self.dependences if dependence.view == "angle"]
+        spoken = [order for order in orders if order.sentence] or orders
         return max(spoken, key=lambda one: one.strength, default=None)
 
     def by_view(self, view: str) -> Dependence | None:
         """Return the dependence shown by a view; of the angle, the strongest order."""
         if view == "angle":
             return self.strongest_order
-        return next((one for one in self.dependences if one.view == view), None)
+        return next((dependence for dependence in self.dependences if dependence.view == view), None)
 
 
 def residual_views(run: RunView, channels: Sequence[str], *, bias_instability: float = 0.0) -> ResidualViews:

@@ -24,7 +24,7 @@ __all__ = ["run_views"]
 
 def run_views(prepared: PreparedRuns, stretches: Sequence[Stretch], believed: Fit) -> tuple[RunView, ...]:
     """Collect each run for pictures: before is the given twin driven by the reference alone."""
-    return tuple(_view(prepared, number, stretches, believed) for number in range(len(prepared.runs)))
+    return tuple(_view(prepared, index, stretches, believed) for index in range(len(prepared.runs)))
 
 
 def _view(prepared: PreparedRuns, number: int, stretches: Sequence[Stretch], believed: Fit) -> RunView:

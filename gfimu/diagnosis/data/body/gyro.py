@@ -138,8 +138,8 @@ def _factor(weight: NDArray[np.float64], order: int, stiffness: float) -> NDArra
     step = np.array([(-1.0) ** k * comb(order, k) for k in range(order + 1)])
     band = np.zeros((order + 1, n))  # band[order − j, i + j] is entry (i, i + j)
     for offset in range(order + 1):
-        for place in range(order + 1 - offset):
-            start = place + offset
-            band[order - offset, start : start + n - order] += stiffness * step[place] * step[start]
+        for index in range(order + 1 - offset):
+            start = index + offset
+            band[order - offset, start : start + n - order] += stiffness * step[index] * step[start]
     band[-1] += weight
     return np.asarray(cholesky_banded(band))

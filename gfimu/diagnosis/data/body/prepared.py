@@ -49,9 +49,9 @@ def prepare_bodies(
     runs: list[Run] = []
     effects: list[list[Effect]] = []
     why: dict[str, str] = {}
-    for number, (recording, name) in enumerate(zip(recordings, names, strict=True)):
+    for index, (recording, name) in enumerate(zip(recordings, names, strict=True)):
         body = prepare_body_run(recording, model, name=name)
-        stretch = BodyStretch(model, body, number, float(body.t[0]))
+        stretch = BodyStretch(model, body, index, float(body.t[0]))
         _refuse_too_few(stretch, name)
         checked = check_integrity(model, body, robust_prediction(stretch))
         run = replace(body, valid=checked.run.valid)

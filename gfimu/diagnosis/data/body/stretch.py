@@ -166,7 +166,7 @@ class BodyStretch(Stretch):
     def halves(self) -> tuple[BodyStretch, BodyStretch]:
         """Return the odd and the even parts of the run."""
         turn = (np.arange(len(self.starts)) * _PARTS // len(self.starts)) % 2
-        one, other = (replace(self, part=turn == place) for place in range(2))
+        one, other = (replace(self, part=turn == index) for index in range(2))
         return one, other
 
 

@@ -112,8 +112,8 @@ def _other_ranges(
     options: list[_Option] = []
     for factor in _RANGE_FACTORS:
         scaled = np.diag(_misfits(run, factor * prediction, white))
-        for number, chip in enumerate(model.array.chips):
-            mine = model.array.chip_of_channel == number
+        for index, chip in enumerate(model.array.chips):
+            mine = model.array.chip_of_channel == index
             after, before = float(scaled[mine].sum()), float(own[mine].sum())
             # A prediction that is too large by far comes nearer by any factor.
             limit = min((1 - _REMOVED) * before, _FITTING * float(power[mine].sum()))
@@ -130,7 +130,7 @@ def _exchanged_chips(
     """Return whole chips that may be exchanged, where that clears more than the exchange of two channels does."""
     options: list[_Option] = []
     chips, names = model.array.chips, model.array.channels
-    channels = [np.flatnonzero(model.array.chip_of_channel == number) for number in range(len(chips))]
+    channels = [np.flatnonzero(model.array.chip_of_channel == index) for index in range(len(chips))]
     for one, two in combinations(range(len(chips)), 2):
         if len(channels[one]) != len(channels[two]) or len(channels[one]) < 2:
             continue

@@ -145,7 +145,7 @@ def require_visible(array: AccelerometerArray, axis: TurningAxis) -> None:
 def _covariance(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the variances of the first two columns' coefficients, (2,); infinite where they are not observable."""
     found = np.full(2, np.inf)
-    others_of = [[place for place in range(matrix.shape[1]) if place != column] for column in (0, 1)]
+    others_of = [[index for index in range(matrix.shape[1]) if index != column] for column in (0, 1)]
     for column, others in enumerate(others_of):
         rest = matrix[:, others]
         basis = np.linalg.svd(rest, full_matrices=False)

@@ -63,7 +63,7 @@ class AxisDrift(Declared, PlottedResult):
     def to_columns(self) -> dict[str, NDArray[Any]]:
         """Return one row per cause: its size, and the standard deviations of rate and angle at the end."""
         return {
-            "cause": text_column(one.name for one in self.terms),
+            "cause": text_column(term.name for term in self.terms),
             "size": text_column(one.size for one in self.terms),
             "rate_std_rad_s": np.array([one.rate_std for one in self.terms]),
             "angle_std_rad": np.array([one.angle_std for one in self.terms]),
@@ -77,7 +77,7 @@ class AxisDrift(Declared, PlottedResult):
 
     def _panels(self) -> list[Panel]:
         columns = self.to_columns()
-        names = (*(one.name for one in self.terms), "total")
+        names = (*(term.name for term in self.terms), "total")
         return [
             Panel(title, label, (Series("", np.append(columns[key], whole)),), names, scale="zero")
             for title, label, key, whole in (
@@ -93,7 +93,7 @@ class AxisDrift(Declared, PlottedResult):
         float, figure("Standard deviation of the rate.", "rad/s", head="rate, σ", form=".3g", before="remark")
     ]:
         """Standard deviation of the rate by all causes, rad/s."""
-        return float(np.sqrt(sum(one.rate_std**2 for one in self.terms)))
+        return float(np.sqrt(sum(term.rate_std**2 for term in self.terms)))
 
     @property
     def angle_std_rad(
@@ -102,7 +102,7 @@ class AxisDrift(Declared, PlottedResult):
         float, figure("Standard deviation of the angle.", "rad", head="angle, σ", form=".3g", before="remark")
     ]:
         """Standard deviation of the angle by all causes, rad."""
-        return float(np.sqrt(sum(one.angle_std**2 for one in self.terms)))
+        return float(np.sqrt(sum(term.angle_std**2 for term in self.terms)))
 
     def shown(self) -> Iterator[Table | str]:
         """Yield the causes, and what bounds the drift."""

@@ -87,9 +87,9 @@ class LiveBlock:
         """Return a block of readings (n, c), m/s², at times (n,), s, and of estimates that became ready."""
         none = np.empty(0)
         made = [cls(t, readings, none, np.empty((0, 3)), np.empty((0, 3)), none)]
-        for one in rates:
-            chance = np.ones(len(one)) if one.sign_probability is None else one.sign_probability
-            made.append(cls(t[:0], readings[:0], one.t_s, one.omega, one.std, chance))
+        for rate in rates:
+            chance = np.ones(len(rate)) if rate.sign_probability is None else rate.sign_probability
+            made.append(cls(t[:0], readings[:0], rate.t_s, rate.omega, rate.std, chance))
         return cls.join(made)
 
     @classmethod

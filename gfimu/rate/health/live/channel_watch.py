@@ -233,27 +233,27 @@ class LiveWatch:
     def _changes(self, monitor: ChannelMonitor, now: float) -> list[HealthEvent]:
         """Compare the faults with those that were reported."""
         events = []
-        for number, fault in enumerate(monitor.faults):
-            if number == len(self._reported):
+        for index, fault in enumerate(monitor.faults):
+            if index == len(self._reported):
                 named = self._named(monitor, fault, early=True)
                 self._reported.append(named)
-                self._unnamed.add(number)
+                self._unnamed.add(index)
                 events.append(HealthEvent(now, "excluded", named, named.sentence()))
                 continue
-            before = self._reported[number]
+            before = self._reported[index]
             if np.isfinite(fault.end_s) and not np.isfinite(before.end_s):
-                self._reported[number] = replace(before, end_s=fault.end_s)
+                self._reported[index] = replace(before, end_s=fault.end_s)
                 names = ", ".join(fault.channels)
                 events.append(
                     HealthEvent(
-                        now, "readmitted", self._reported[number],
+                        now, "readmitted", self._reported[index],
                         f"{names}: used again from {fault.end_s:.4g} s on",
                     )
                 )  # fmt: skip
-            elif number in self._unnamed and now >= before.found_s + self.policy.kind_span_s:
-                self._unnamed.discard(number)
+            elif index in self._unnamed and now >= before.found_s + self.policy.kind_span_s:
+                self._unnamed.discard(index)
                 named = self._named(monitor, replace(fault, end_s=before.end_s))
-                self._reported[number] = named
+                self._reported[index] = named
                 events.append(HealthEvent(now, "measured", named, named.sentence()))
         doubts = monitor.doubtful
         if len(doubts) > self._doubts:

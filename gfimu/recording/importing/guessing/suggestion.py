@@ -231,7 +231,7 @@ def _most_promising(raw: RawFile) -> RawTable:
 
     def worth(table: RawTable) -> tuple[int, int, int]:
         forces = [one.columns for one in find_triads(table) if one.kind == "acceleration"]
-        gravity = sum(unit_of_acceleration(table, one).is_gravity for one in forces)
+        gravity = sum(unit_of_acceleration(table, force).is_gravity for force in forces)
         return gravity, len(forces), len(table)
 
     return max(raw.tables.values(), key=worth)
@@ -243,7 +243,7 @@ def _leading_rows(table: RawTable, time: TimeGuess) -> tuple[int, TimeGuess]:
     if time.is_rate_known or table.named or len(columns) != len(table.columns) or len(columns) < 3:
         return 0, time
     start, rate = float(columns[0][0]), float(columns[0][1])
-    same = all(float(one[0]) == start and float(one[1]) == rate for one in columns)
+    same = all(float(column[0]) == start and float(column[1]) == rate for column in columns)
     if not same or not _EPOCH[0] < start < _EPOCH[1] or not RATES[0] <= rate <= RATES[1]:
         return 0, time
     return 2, TimeGuess(TimeSpec(rate_hz=rate), f"the second row states {rate:g} Hz")

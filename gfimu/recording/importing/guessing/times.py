@@ -102,7 +102,7 @@ def stated_rate(table: RawTable) -> tuple[float, str] | None:
 
 def _candidates(table: RawTable) -> Iterator[tuple[float, TimeGuess]]:
     """Yield columns that may be the time, with a score: a unit in the name 6, a word of time 4, texts 3.5."""
-    for place, (name, values) in enumerate(table.columns.items()):
+    for index, (name, values) in enumerate(table.columns.items()):
         is_text = values.dtype == object
         if values.dtype.kind == "M":
             stamps = values.astype("datetime64[ns]").astype(np.int64)
@@ -112,7 +112,7 @@ def _candidates(table: RawTable) -> Iterator[tuple[float, TimeGuess]]:
         else:
             found = _of_numbers(table, name, values)
         if found is not None:
-            yield found[0] - 0.01 * place, found[1]
+            yield found[0] - 0.01 * index, found[1]
 
 
 def _of_texts(name: str, values: NDArray[Any]) -> tuple[float, TimeGuess] | None:

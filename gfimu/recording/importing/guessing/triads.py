@@ -94,7 +94,7 @@ def _numbered(table: RawTable, free: Mapping[str, str]) -> list[tuple[str, str, 
         if len(order) < 6 or len(order) % 3 or order != list(range(order[0], order[0] + len(order))):
             continue
         groups = [(columns[at], columns[at + 1], columns[at + 2]) for at in order[::3]]
-        if all(_is_gravity(table, one) for one in groups):
+        if all(_is_gravity(table, group) for group in groups):
             threes += groups
     return threes
 
@@ -152,7 +152,7 @@ def _is_gravity(table: RawTable, columns: tuple[str, str, str]) -> bool:
 
 def _threes(table: RawTable, names: Sequence[str]) -> list[Triad]:
     groups = [(names[first], names[first + 1], names[first + 2]) for first in range(0, len(names) - 2, 3)]
-    return [Triad(one, _kind_by_numbers(table, one)) for one in groups]
+    return [Triad(group, _kind_by_numbers(table, group)) for group in groups]
 
 
 def _by_gravity(table: RawTable, triads: Sequence[tuple[Triad, bool]]) -> list[Triad]:

@@ -59,7 +59,7 @@ def _check_own(path: Path, name: str, item: Any) -> None:
     if item.is_virtual:
         raise InputError(f"{path}: data set {_shown(name)} is put together of other files; write it into this one")
     unknown = [
-        kind for kind in (made.get_filter(place)[0] for place in range(made.get_nfilters())) if kind not in _FILTERS
+        kind for kind in (made.get_filter(index)[0] for index in range(made.get_nfilters())) if kind not in _FILTERS
     ]
     if unknown:
         raise InputError(

@@ -112,7 +112,7 @@ def read_mcap(path: Path, text: TextSpec = TextSpec()) -> RawFile:
         reader = make_reader(stream)
         summary = reader.get_summary()
         if summary is not None:
-            unpacked = max((one.uncompressed_size for one in summary.chunk_indexes), default=0)
+            unpacked = max((index.uncompressed_size for index in summary.chunk_indexes), default=0)
             count = summary.statistics.message_count if summary.statistics else 0
             MemoryLimit.of(path).needs(_ROW * count + _TIMES_CHUNK * unpacked)
         return _topics(path, "mcap", messages(reader), others)
@@ -131,7 +131,7 @@ def read_bag(path: Path, text: TextSpec = TextSpec()) -> RawFile:
         opened, decode = rosbag2.Reader, get_typestore(Stores.ROS2_HUMBLE).deserialize_cdr
     folder = path.parent if path.suffix == ".db3" else path
     with parsing(path, "ROS bag", "record it again"), opened(folder) as reader:
-        imu = [one for one in reader.connections if one.msgtype == _IMU]
+        imu = [connection for connection in reader.connections if connection.msgtype == _IMU]
         others = {one.topic for one in reader.connections} - {one.topic for one in imu}
         MemoryLimit.of(path).needs(_ROW * sum(one.msgcount for one in imu))
         found = reader.messages(connections=imu) if imu else ()

@@ -107,7 +107,7 @@ def _side_by_side(lists: Mapping[str, list[Any]]) -> Iterator[tuple[str, list[An
     for key, one in lists.items():
         widths = {len(row) for row in one if isinstance(row, list)}
         if len(widths) == 1 and all(isinstance(row, list) for row in one):
-            yield from ((f"{key}[{place}]", [row[place] for row in one]) for place in range(min(widths)))
+            yield from ((f"{key}[{index}]", [row[index] for row in one]) for index in range(min(widths)))
         else:
             yield key, one
 
@@ -122,8 +122,8 @@ def _of_records(records: list[Any], name: str) -> Iterator[tuple[str, RawTable]]
     large = [rows for rows in kinds.values() if len(rows) >= 0.1 * max(map(len, kinds.values()), default=0)]
     apart = len(large) > 1 and all(
         len(set(one[0]) & set(two[0])) < 0.7 * max(len(one[0]), len(two[0]))
-        for place, one in enumerate(large)
-        for two in large[place + 1 :]
+        for index, one in enumerate(large)
+        for two in large[index + 1 :]
     )
     if not apart:
         large = [[row for rows in kinds.values() for row in rows]] if len(kinds) == 1 else [_in_order(records)]
@@ -135,7 +135,7 @@ def _of_records(records: list[Any], name: str) -> Iterator[tuple[str, RawTable]]
 
 
 def _in_order(records: list[Any]) -> list[dict[str, Any]]:
-    return [dict(_flat(one, "")) for one in records if isinstance(one, Mapping)]
+    return [dict(_flat(record, "")) for record in records if isinstance(record, Mapping)]
 
 
 def _flat(record: Mapping[str, Any], before: str) -> Iterator[tuple[str, Any]]:
@@ -145,11 +145,11 @@ def _flat(record: Mapping[str, Any], before: str) -> Iterator[tuple[str, Any]]:
         if isinstance(value, Mapping):
             yield from _flat(value, f"{name}.")
         elif isinstance(value, list) and len(value) <= _MOST_CELLS:
-            for place, one in enumerate(value):
+            for index, one in enumerate(value):
                 if isinstance(one, Mapping):
-                    yield from _flat(one, f"{name}[{place}].")
+                    yield from _flat(one, f"{name}[{index}].")
                 else:
-                    yield f"{name}[{place}]", one
+                    yield f"{name}[{index}]", one
         elif not isinstance(value, list):
             yield name, value
 
@@ -157,7 +157,7 @@ def _flat(record: Mapping[str, Any], before: str) -> Iterator[tuple[str, Any]]:
 def _table(name: str, columns: Mapping[str, list[Any]], notes: list[str]) -> RawTable:
     found: dict[str, NDArray[Any]] = {}
     for key, cells in columns.items():
-        whole = all(type(one) is int and abs(one) < 2**63 for one in cells)
+        whole = all(type(cell) is int and abs(cell) < 2**63 for cell in cells)
         numbers = [one for one in cells if isinstance(one, int | float) and not isinstance(one, bool)]
         if whole:
             found[key] = np.array(cells, dtype=np.int64)

@@ -69,7 +69,7 @@ def read_archive(path: Path, text: TextSpec = TextSpec()) -> RawFile:
     limit = MemoryLimit.of(path)
     with parsing(path, "archive", "copy it again", enforced=False), zipfile.ZipFile(path) as archive:
         members = [one for one in archive.infolist() if Path(one.filename).suffix.lower() in {".csv", ".txt", ".tsv"}]
-        limit.needs(GROWS * sum(one.file_size for one in members))
+        limit.needs(GROWS * sum(member.file_size for member in members))
         tables = {one.filename: _member(archive.read(one), path, one.filename, text, limit) for one in members}
     found = {name: table for name, table in tables.items() if table is not None}
     if not found:

@@ -112,14 +112,14 @@ def _data_lines(lines: Sequence[str], separator: str, decimal: str, skip: int) -
     """Return the lines that hold numbers, with their places."""
     number = _NUMBER[decimal]
     found = []
-    for place, line in enumerate(lines):
-        if place < skip or not line.strip() or line.lstrip()[0] in COMMENT_MARKS:
+    for index, line in enumerate(lines):
+        if index < skip or not line.strip() or line.lstrip()[0] in COMMENT_MARKS:
             continue
         cells = cells_of(line, separator)
         filled = [cell for cell in cells if cell]
         numeric = sum(len(cell) <= _LONGEST_CELL and number.fullmatch(cell) is not None for cell in filled)
         if numeric and numeric >= _LEAST_NUMBERS * len(filled):
-            found.append((place, cells))
+            found.append((index, cells))
     return found
 
 

@@ -23,7 +23,7 @@ def answer(task: Task) -> dict[str, Any]:
     chosen: list[Candidate] = []
     reached = 0.0
     for _ in range(_MOST):
-        longer = max(([*chosen, one] for one in library.candidates), key=score)
+        longer = max(([*chosen, candidate] for candidate in library.candidates), key=score)
         if score(longer) <= reached:
             break
         chosen, reached = longer, score(longer)

@@ -125,8 +125,8 @@ def footsteps(one, run, places):
     luck, natural = run.luck(), 2 * np.pi * one["frequency_hz"]
     up = np.zeros_like(run.t)
     for begin in luck.uniform(run.t[0], run.t[-1], max(2, int(np.ptp(run.t) / 12))):
-        for number in range(luck.integers(4, 10)):
-            since = np.maximum(run.t - begin - one["pace_s"] * (number + 0.05 * luck.standard_normal()), 0.0)
+        for index in range(luck.integers(4, 10)):
+            since = np.maximum(run.t - begin - one["pace_s"] * (index + 0.05 * luck.standard_normal()), 0.0)
             ring = np.exp(-one["damping_ratio"] * natural * since) * np.sin(natural * since)
             up += luck.uniform(0.5, 1.5) * ring * -np.expm1(-((since / 0.01) ** 2))
     return places.moved(np.outer(one["amplitude_m_s2"] / natural**2 * up, [0.0, 0.0, 1.0]))

@@ -51,8 +51,8 @@ def to_and_fro(rng, fine, begun, top):
 
 def speeds_and_rests(rng, fine, begun, top):
     length, rate, wanted = rng.uniform(3.0, 8.0), 0.0, np.zeros_like(fine)
-    for number, begin in enumerate(np.arange(0.5, fine[-1], length)):
-        target = 0.0 if number % 2 else rng.uniform(0.2, 1.0) * top * (-1.0 if number % 4 else 1.0)
+    for index, begin in enumerate(np.arange(0.5, fine[-1], length)):
+        target = 0.0 if index % 2 else rng.uniform(0.2, 1.0) * top * (-1.0 if index % 4 else 1.0)
         wanted += (target - rate) * np.clip((fine - begin) / rng.uniform(0.3, 1.5), 0, 1)
         rate = target
     return wanted

@@ -102,10 +102,10 @@ class TableRun:
 def mjcf_of(rig, step):
     turn = Rotation.from_rotvec([*rig.mount_tilt, 0.0]).as_quat(scalar_first=True)
     sites, sensors = [], []
-    for number, (place, turned) in enumerate(zip(CHIPS + rig.moved, rig.turned, strict=True)):
+    for index, (place, turned) in enumerate(zip(CHIPS + rig.moved, rig.turned, strict=True)):
         quat = Rotation.from_rotvec(turned).as_quat(scalar_first=True)
-        sites.append(f'<site name="c{number}" pos="{_words(place)}" quat="{_words(quat)}"/>')
-        sensors.append(f'<accelerometer name="f{number}" site="c{number}"/>')
+        sites.append(f'<site name="c{index}" pos="{_words(place)}" quat="{_words(quat)}"/>')
+        sensors.append(f'<accelerometer name="f{index}" site="c{index}"/>')
     mode = 0.006 * (0.02**2 + 0.02**2) / 12  # kg m², box of 2 cm
     natural = 2 * np.pi * rig.torsion_hz
     return MJCF.format(

@@ -195,7 +195,7 @@ def measured(rng, plan, t, readings, tacho, temperature, hidden):
     samples += walk / np.sqrt(plan.sample_rate) * np.cumsum(rng.standard_normal(readings.shape), axis=0)
     counts, kept = digital(samples, t, hidden, rng)
     columns = {"t_s": t[kept]}
-    columns |= {f"{name}_m_s2": counts[kept, number] for number, name in enumerate(CHANNELS)}
+    columns |= {f"{name}_m_s2": counts[kept, index] for index, name in enumerate(CHANNELS)}
     columns["tacho_rad_s"] = (tacho + plan.tacho_noise_rad_s * rng.standard_normal(len(t)))[kept]
     columns["temperature_degC"] = np.round(temperature(t[kept]) * 16) / 16
     return columns
