@@ -10,7 +10,7 @@ gfimu firmware run --help
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, overload
+from typing import TYPE_CHECKING, Annotated, Any, TypedDict, Unpack, overload
 
 from gfimu.base.errors import InputError
 from gfimu.base.files.outputs import RECORDING, TRACE, OutputFolder
@@ -81,35 +81,31 @@ def _run_on_shell(given: Mapping[str, Any], as_json: bool) -> None:
     print_report(run.__command__, {**given, "on_open": opened}, as_json=as_json)  # type: ignore[attr-defined]
 
 
+class _Asked(TypedDict, total=False):
+    """What can be asked of a run on a port or without one."""
+
+    scenario: str | Path
+    duration: float | None
+    rate: int
+    range_g: int
+    seed: int
+    image: str | Path
+    pure_python: bool
+
+
 @overload
 def run(
     *,
-    scenario: str | Path = ...,
     port: None = ...,
     out: str | Path | None = ...,
-    duration: float | None = ...,
-    rate: int = ...,
-    range_g: int = ...,
-    seed: int = ...,
-    image: str | Path = ...,
-    pure_python: bool = ...,
     progress: Callable[[float], None] | None = ...,
+    **asked: Unpack[_Asked],
 ) -> "VirtualRun": ...
 
 
 @overload
 def run(
-    *,
-    scenario: str | Path = ...,
-    port: str,
-    duration: float | None = ...,
-    rate: int = ...,
-    range_g: int = ...,
-    realtime: bool = ...,
-    seed: int = ...,
-    image: str | Path = ...,
-    pure_python: bool = ...,
-    on_open: Callable[[str], None] | None = ...,
+    *, port: str, realtime: bool = ..., on_open: Callable[[str], None] | None = ..., **asked: Unpack[_Asked]
 ) -> "ServeReport": ...
 
 

@@ -119,7 +119,8 @@ def view(
         write_picture(picture, file, rig=drawn_rig(file))
     else:
         drawn = None if array is None else as_array(array)
-        is_estimate = isinstance(file, Estimate)
-        run = file if is_estimate else as_source(source or file, drawn, column_map, max_memory=max_memory)
+        run = (
+            file if isinstance(file, Estimate) else as_source(source or file, drawn, column_map, max_memory=max_memory)
+        )
         picture_of(run, picture, array=drawn, axis=as_known_axis(axis).axis, force=force)
     return Viewed(picture, opens=out is None)

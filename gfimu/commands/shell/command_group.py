@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, MutableMapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import typer
@@ -30,7 +30,7 @@ class CommandGroup(GfimuGroup):
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(**settings)
-        self.commands = _Commands()
+        self.commands = _Commands()  # type: ignore[assignment]
 
     def shell_complete(self, ctx: Any, incomplete: str) -> list[Any]:
         """Return the commands that begin so, without importing any, or the options of the program."""
@@ -58,28 +58,21 @@ class CommandGroup(GfimuGroup):
                 formatter.write_dl([(name.ljust(width), help_line(name)) for name in names])
 
 
-class _Commands(MutableMapping[str, Any]):
+class _Commands(Mapping[str, Any]):
     """Commands by name, each made when it is asked for."""
 
     def __init__(self) -> None:
         self._loaded: dict[str, Any] = {}
 
     def __getitem__(self, name: str) -> Any:
+        if name not in COMMANDS:
+            raise KeyError(name)
         if name not in self._loaded:
             app = CommandApp()
             app.callback()(_no_options)  # a group even where a file registers one command
-            if name not in COMMANDS:
-                raise KeyError(name)
             add_commands(app, name, declared_commands(name))
-            group = typer.main.get_command(app)
-            self._loaded |= group.commands  # type: ignore[attr-defined]
+            self._loaded[name] = typer.main.get_command(app).commands[name]  # type: ignore[attr-defined]
         return self._loaded[name]
-
-    def __setitem__(self, name: str, command: Any) -> None:
-        self._loaded[name] = command
-
-    def __delitem__(self, name: str) -> None:
-        del self._loaded[name]
 
     def __iter__(self) -> Iterator[str]:
         return iter(COMMANDS)
