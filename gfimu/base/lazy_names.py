@@ -5,14 +5,13 @@ from __future__ import annotations
 import ast
 import importlib
 import sys
-import types
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Any
 
 from gfimu.base.optional_packages import require
 
-__all__ = ["declared_names", "homes_of", "returned_type"]
+__all__ = ["declared_names", "homes_of"]
 
 
 def declared_names(
@@ -47,25 +46,8 @@ def declared_names(
 
 
 def homes_of(package: str) -> dict[str, str]:
-    """Return the module of each name that a package, which is imported, declares."""
-    return {alias.asname: module for alias, module in _imports_for_types(package) if alias.asname}
-
-
-def returned_type(function: Callable[..., Any]) -> Any:
-    """Return the type that a function is annotated to return; what its module imports for type checkers is loaded."""
-    homes = {alias.name: module for alias, module in _imports_for_types(function.__module__)}
-
-    class Names(dict[str, Any]):
-        def __missing__(self, name: str) -> Any:
-            return getattr(importlib.import_module(homes[name]), name)  # a KeyError sends Python to the globals
-
-    annotated = types.SimpleNamespace(__annotations__={"returned": function.__annotations__["return"]})
-    return get_type_hints(annotated, vars(sys.modules[function.__module__]), Names())["returned"]
-
-
-def _imports_for_types(package: str) -> Iterator[tuple[ast.alias, str]]:
-    """Yield the names that a module, which is imported, imports for type checkers only, and their modules."""
+    """Return the module of each name that a package or module, which is imported, imports for type checkers only."""
     source = Path(str(sys.modules[package].__file__)).read_text(encoding="utf-8")
     blocks = [node for node in ast.parse(source).body if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node)]
     imports = [node for block in blocks for node in block.body if isinstance(node, ast.ImportFrom)]
-    yield from ((alias, str(node.module)) for node in imports for alias in node.names)
+    return {alias.asname or alias.name: str(node.module) for node in imports for alias in node.names}

@@ -47,7 +47,7 @@ _REST = Option(
 )
 
 
-@command(results=tuple, doing="stating the calibration")  # gfimu.commands.schema has that of the format
+@command(doing="stating the calibration")
 def certificate(
     calibration: Annotated["Calibration | str | Path", _CALIBRATION],
     *,

@@ -64,7 +64,7 @@ def _report(text: str, given: Any) -> Begun:
     return Begun(given["kind"], text, bool(_files(text, given)))
 
 
-@command(report=_report, files=_files)
+@command(report=_report, files=_files, results=lambda: (Begun,))
 def new(
     kind: Annotated[str, _KIND],
     folder: Annotated[str | Path | None, _FOLDER] = None,

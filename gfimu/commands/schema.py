@@ -59,7 +59,7 @@ def _kinds(name: str) -> tuple[list[Any], list[Any]]:
 
     declared = next(one for one in declared_commands(name.split(maxsplit=1)[0]) if one.name == name)
     whole = [declared, *(part.__command__ for part in declared.parts)]
-    results = [(one, kind) for one in whole for kind in one.printed]
+    results = [(one, kind) for one in whole for kind in one.results()]
     kinds, parts = [], []
     for one, kind in results:
         if not (isinstance(kind, type) and issubclass(kind, Declared)):
@@ -67,7 +67,7 @@ def _kinds(name: str) -> tuple[list[Any], list[Any]]:
             continue
         root, *inner = structs_of(kind)
         named = one.names_files(kind)
-        kinds.append(_with_files(root, always=len(one.printed) == 1) if named else root)
+        kinds.append(_with_files(root, always=len(one.results()) == 1) if named else root)
         parts += [part for part in inner if part not in kinds]
     return kinds, parts
 
@@ -103,7 +103,7 @@ def _run(given: Mapping[str, Any], as_json: bool) -> None:
         print_paths([("schema", given["out"])])
 
 
-@command(run=_run)
+@command(run=_run, results=lambda: (dict[str, Any],))
 def schema(
     command: Annotated[str, _COMMAND],
     *,

@@ -51,7 +51,7 @@ def _report(text: str, given: Any) -> Shown:
     return Shown(given["name"], text)
 
 
-@command(report=_report)
+@command(report=_report, results=lambda: (Shown,))
 def show(
     name: Annotated[str, _NAME],
     *,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import inspect
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +14,8 @@ from gfimu.commands.shell.declare import Command, Option, choices_of, marked
 from gfimu.commands.shell.printing import print_report
 
 __all__ = ["shell_command"]
+
+_IS_PATH = re.compile(r"\bPath\b(?!\])")  # and no list of paths
 
 
 def shell_command(declared: Command) -> Callable[..., None]:
@@ -64,7 +67,8 @@ def _with_parts(declared: Command) -> Command:
 
 def _shell_parameter(name: str, parameter: inspect.Parameter, option: Option) -> inspect.Parameter:
     """Return a parameter as Typer takes it."""
-    kind = option.kind or (parameter.annotation.__origin__ if option.writes is None else Path)
+    annotated = parameter.annotation.__origin__
+    kind = option.kind or (Path if _IS_PATH.search(str(annotated)) else annotated)
     default = inspect.Parameter.empty if option.needed else None if parameter.default == () else parameter.default
     words_only = str if choices_of(parameter) else kind
     optional: Any = words_only | None if default is None else words_only

@@ -11,15 +11,15 @@ import functools
 import inspect
 import re
 import textwrap
-import types
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, is_dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, ParamSpec, Protocol, TypeVar, get_args, get_origin, overload
 
+from gfimu.base.declared import Declared
 from gfimu.base.errors import InputError, did_you_mean, unknown_name
 from gfimu.base.files.outputs import Output, OutputFolder, check_outputs, files_named
-from gfimu.base.lazy_names import returned_type
+from gfimu.base.lazy_names import declared_names
 from gfimu.commands.shell.completion import words
 
 __all__ = ["Command", "Group", "Option", "choices_of", "command", "command_of", "marked", "module_help"]
@@ -43,7 +43,7 @@ class Option:
     name : str
         Name of the option on the shell, where the parameter's name does not serve.
     kind : object
-        Type of the value on the shell, where the Python parameter takes objects too; of an output a path.
+        Type of the value on the shell, where the Python parameter takes objects too; where it takes a path, a path.
     panel : str
         Heading under which help lists the option; empty for the first list.
     offers : callable, optional
@@ -160,9 +160,9 @@ class Command:
         The function, unchecked.
     report : callable, optional
         Makes what is printed of the function's result and the arguments; by default the result itself is.
-    results : callable, optional
-        Returns the classes of what is printed, for the schema, where what the report or the function is annotated to
-        return does not say them.
+    results : callable
+        Returns the classes of what is printed, for the schema; by default those that the report returns, or the
+        function.
     doing : str or callable
         What a progress bar says, or a function of the arguments that returns it; empty for none.
     run : callable, optional
@@ -184,7 +184,7 @@ class Command:
     name: str
     function: Callable[..., Any]
     report: Callable[[Any, _Given], Shown] | None = None
-    results: Callable[[], tuple[Any, ...]] | None = None
+    results: Callable[[], tuple[Any, ...]] = tuple
     doing: str | Callable[[_Given], str] = ""
     run: Callable[..., None] | None = None
     files: Callable[[Any, _Given], Mapping[str, Path]] | None = None
@@ -226,14 +226,6 @@ class Command:
         """Parameters of the options that the shell alone has, by name."""
         parameters = {} if self.run is None else dict(inspect.signature(self.run).parameters)
         return {name: parameters[name] for name in marked(parameters, Option)}
-
-    @property
-    def printed(self) -> tuple[Any, ...]:
-        """Classes of what is printed."""
-        if self.results is not None:
-            return self.results()
-        kind = returned_type(self.report or self.function)
-        return get_args(kind) if isinstance(kind, types.UnionType) else (kind,)
 
     @property
     def writes(self) -> bool:
@@ -311,7 +303,8 @@ def command(name: str = "", **settings: Any) -> Any:
     """Return the decorator that makes a function a command; the settings are those of `Command`."""
 
     def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
-        declared = Command(name or function.__name__, function, **settings)
+        results = functools.partial(_returned_results, settings.get("report") or function)
+        declared = Command(name or function.__name__, function, **{"results": results, **settings})
         signature = inspect.signature(function)
 
         @functools.wraps(function)
@@ -351,9 +344,9 @@ def marked(parameters: Mapping[str, inspect.Parameter], kind: type[_Mark]) -> di
     found = {}
     for name, parameter in parameters.items():
         marks = getattr(parameter.annotation, "__metadata__", ())
-        mark = next((one for one in marks if isinstance(one, kind)), None)
-        if mark is not None:
-            found[name] = mark
+        of_kind = [mark for mark in marks if isinstance(mark, kind)]
+        if of_kind:
+            found[name] = of_kind[-1]  # the command's own words, where it says more than the shared parameter
     return found
 
 
@@ -362,6 +355,14 @@ def choices_of(parameter: inspect.Parameter) -> tuple[Any, ...]:
     kind = getattr(parameter.annotation, "__origin__", None)
     kinds = get_args(kind) if get_origin(kind) is not Literal else (kind,)
     return next((get_args(one) for one in kinds if get_origin(one) is Literal), ())
+
+
+def _returned_results(function: Callable[..., Any]) -> tuple[type[Declared], ...]:
+    """Return the results that the return annotation of a function names, which its file may import for types only."""
+    names = re.findall(r"\w+", str(inspect.signature(function).return_annotation))
+    load, _, imported = declared_names(function.__module__)
+    kinds = [load(name) for name in names if name in imported]
+    return tuple(kind for kind in kinds if isinstance(kind, type) and issubclass(kind, Declared))
 
 
 def _plain_signature(signature: inspect.Signature, gives: Callable[[Any], Any] | None) -> inspect.Signature:
