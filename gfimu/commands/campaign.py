@@ -27,14 +27,12 @@ __all__ = ["campaign", "campaign_plot", "campaign_status", "campaign_table"]
 _PICTURE = OutputFile(
     "a picture", (".png", ".svg", ".html"), dict.fromkeys((".png", ".svg", ".html"), ("matplotlib",)), any_case=True
 )
-_PLAN = Option(
-    "Plan (.toml), or the folder of a campaign, of which nothing is run.", "PLAN", kind=Path, argument=True, reads=True
-)
+_PLAN = Option("Plan (.toml), or the folder of a campaign, of which nothing is run.", "PLAN", argument=True, reads=True)
 _OUT = Option("Folder to write; one that was begun is continued.", writes=OutputFolder(("plan.toml",)), what="campaign")
 _WORKERS = WORKERS.also("; with --cluster slurm, jobs", least=1)
 _CLUSTER = Option("Dask scheduler instead, such as tcp://host:8786, or slurm.")
 _PROGRESS = Option("Called with the number of cases that are done and of all.", shell=False)
-_FOLDER = Option("Folder of the campaign.", "DIR", kind=Path, argument=True, reads=True)
+_FOLDER = Option("Folder of the campaign.", "DIR", argument=True, reads=True)
 _TABLE = OutputFile("a table", (".csv",))
 _CSV = Option("File to write: the quantiles, one row per group.", "FILE", writes=_TABLE, what="quantiles")
 _DRAWING = Option("Picture to write (.png, .svg, .html).", writes=_PICTURE, what="picture")

@@ -9,7 +9,6 @@ gfimu simulate paper_run --out run.csv --set sensor.range_g=8 --set duration_s=5
 gfimu simulate tumble --out tumble.parquet --rrd tumble.rrd
 """
 
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -82,28 +81,7 @@ def simulate(
         MemoryLimit.of_work(with_memory(scenario, max_memory)).needs(memory_of(run))
     recording = run_scenario(run, seed=seed, out=out, raw=raw, progress=progress)
     if rrd is not None:
-        _draw(rrd, run, recording)
+        from sim.drawing import draw_simulated
+
+        draw_simulated(rrd, run, recording)
     return summarise(run, recording)
-
-
-def _draw(rrd: "str | Path", run: "Scenario", recording: "Recording") -> None:
-    """Draw what was simulated: on its turntable, about a level or inclined axis, on a carriage, or free."""
-    from gfimu.visual import write_run
-    from sim.drawing import array_on_axis, rig_drawing
-    from sim.truth import known_motion
-
-    array, known = run.array, known_motion(recording)
-    hung = None if run.free else array_on_axis(run.world)
-    if hung is not None:
-        array, lift = hung
-        known = replace(known, position=known.position + lift)
-    on_table = not run.free and hung is None and run.world.slide is None
-    shapes = rig_drawing(run.world) if on_table else None
-    write_run(rrd, _in_si(recording), array, known=known, shapes=shapes, title=run.name)
-
-
-def _in_si(recording: "Recording") -> "Recording":
-    """Return the readings in m/s²."""
-    if recording.unit == "m_s2":
-        return recording
-    return replace(recording, readings=recording.readings * recording.metadata["lsb_m_s2"], unit="m_s2")
