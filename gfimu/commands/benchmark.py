@@ -230,9 +230,7 @@ def judge(
 
 
 @command("benchmark table")
-def table(
-    results: Annotated[str | Path | Sequence[str | Path], _RESULTS],
-) -> "Judgement":
+def table(results: Annotated[str | Path | Sequence[str | Path], _RESULTS]) -> "Judgement":
     """Summarise judged answers of one or several methods, with 95 % intervals: shares, points, calibration.
 
     Writes nothing.

@@ -110,9 +110,7 @@ def run(
 
 
 @command(
-    "firmware run",
-    run=_run_on_shell,
-    doing=lambda given: f"running {given['image']}" if given["port"] is None else "",
+    "firmware run", run=_run_on_shell, doing=lambda given: f"running {given['image']}" if given["port"] is None else ""
 )
 def run(
     *,
@@ -177,11 +175,7 @@ def _definitions(
     return defines
 
 
-@command(
-    "firmware build",
-    doing="compiling",
-    files=lambda report, _: {"ELF file": report.elf, "image": report.binary},
-)
+@command("firmware build", doing="compiling", files=lambda report, _: {"ELF file": report.elf, "image": report.binary})
 def build(
     image: Annotated[str, replace(_NAMED_IMAGE, text="Image: gfimu or selfcheck.")] = "gfimu",
     *,
@@ -212,9 +206,7 @@ def build(
 
 
 @command(
-    "firmware selftest",
-    doing="testing the emulator and the firmware",
-    exit_code=lambda report: int(not report.passed),
+    "firmware selftest", doing="testing the emulator and the firmware", exit_code=lambda report: int(not report.passed)
 )
 def selftest() -> "SelfTestReport":
     """Check the emulator and the firmware: interrupts, the chips' self-test, the image, both ways of running.
@@ -266,9 +258,7 @@ def trace(
 
 @command("firmware faults", doing="faults", exit_code=lambda report: int(not report.passed))
 def faults(
-    *,
-    seed: Annotated[int, SEED] = 0,
-    progress: Annotated[Callable[[float], None] | None, SHARE] = None,
+    *, seed: Annotated[int, SEED] = 0, progress: Annotated[Callable[[float], None] | None, SHARE] = None
 ) -> "FaultReport":
     """Break the wire, the supply and the chips, one after another, and show what the host makes of it.
 
@@ -286,9 +276,7 @@ def faults(
 
 
 @command(
-    "firmware check",
-    doing=lambda given: f"running {given['image']}",
-    exit_code=lambda report: int(report.faults > 0),
+    "firmware check", doing=lambda given: f"running {given['image']}", exit_code=lambda report: int(report.faults > 0)
 )
 def check(
     image: Annotated[str | Path, _NAMED_IMAGE] = "gfimu",

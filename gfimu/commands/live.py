@@ -20,16 +20,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from gfimu.base.errors import InputError
 from gfimu.commands.known_axis import AXIS_ALONE, AxisLike, as_known_axis
 from gfimu.commands.shell.declare import Option, command
-from gfimu.commands.shell.options import (
-    ARRAY,
-    BIAS_STD_M_S2,
-    FORCE,
-    GYRO,
-    KEEP_FAULTY,
-    MAX_MEMORY,
-    RATE,
-    UNKNOWN_START,
-)
+from gfimu.commands.shell.options import ARRAY, BIAS_STD_M_S2, FORCE, GYRO, KEEP_FAULTY, MAX_MEMORY, RATE, UNKNOWN_START
 
 if TYPE_CHECKING:
     from gfimu.array.array import AccelerometerArray

@@ -104,11 +104,7 @@ def _run(given: Mapping[str, Any], as_json: bool) -> None:
 
 
 @command(run=_run, results=lambda: (dict[str, Any],))
-def schema(
-    command: Annotated[str, _COMMAND],
-    *,
-    out: Annotated[str | Path | None, _OUT] = None,
-) -> dict[str, Any]:
+def schema(command: Annotated[str, _COMMAND], *, out: Annotated[str | Path | None, _OUT] = None) -> dict[str, Any]:
     """Return the JSON schema (2020-12) of a command's output with ``--json``, errors included.
 
     Raises

@@ -52,11 +52,7 @@ def _report(text: str, given: Any) -> Shown:
 
 
 @command(report=_report, results=lambda: (Shown,))
-def show(
-    name: Annotated[str, _NAME],
-    *,
-    max_memory: Annotated["MemorySize | None", MAX_MEMORY] = None,
-) -> str:
+def show(name: Annotated[str, _NAME], *, max_memory: Annotated["MemorySize | None", MAX_MEMORY] = None) -> str:
     """Return the text of a shipped file, of a file of your own, of the array in a recording, or of an effect.
 
     A file of one's own is checked; of a recording the array file is returned.

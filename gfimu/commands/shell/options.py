@@ -141,8 +141,7 @@ MAP = replace(MAP_OF_TABLE, without=("table",))
 
 def _reference_map_from_options(
     reference_map: Annotated[
-        str | None,
-        Option("Column map of the file of references.", "MAP", offers=completion.maps, reads=True),
+        str | None, Option("Column map of the file of references.", "MAP", offers=completion.maps, reads=True)
     ] = None,
     reference_map_set: Annotated[
         list[str], Option("Set a key of the reference's column map; may be repeated.", "KEY=VALUE")
