@@ -19,6 +19,7 @@ __all__ = [
     "RecordingWarning",
     "UnitError",
     "WriteError",
+    "check_name",
     "did_you_mean",
     "naming",
     "nearest_name",
@@ -118,6 +119,12 @@ def naming(source: str) -> Iterator[None]:
         if not source or source in str(error):
             raise
         raise type(error)(f"{source}: {error}") from None
+
+
+def check_name(kind: str, name: str, valid: Iterable[str]) -> None:
+    """Refuse a name that is not in a list; ``kind`` is what it names."""
+    if name not in valid:
+        raise unknown_name(kind, name, valid)
 
 
 def unknown_name(kind: str, name: str, valid: Iterable[str]) -> InputError:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
-from gfimu.base.errors import unknown_name
+from gfimu.base.errors import check_name
 
 __all__ = ["METHODS", "CalibrationMethod", "calibration_method"]
 
@@ -153,6 +153,5 @@ METHODS: Mapping[str, CalibrationMethod] = MappingProxyType({method.name: method
 
 def calibration_method(name: str) -> CalibrationMethod:
     """Look up a calibration method; raises `InputError` that lists the methods."""
-    if name not in METHODS:
-        raise unknown_name("calibration method", name, METHODS)
+    check_name("calibration method", name, METHODS)
     return METHODS[name]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gfimu.base.errors import InputError, unknown_name
+from gfimu.base.errors import InputError, check_name
 
 if TYPE_CHECKING:
     from gfimu.array.array import AccelerometerArray
@@ -49,8 +49,7 @@ def export_calibration(
 
     if to is None:
         raise InputError(f"a calibration is written for one of {', '.join(TARGETS)}; name it with --to")
-    if to not in TARGETS:
-        raise unknown_name("format of a calibration", to, TARGETS)
+    check_name("format of a calibration", to, TARGETS)
     if target is not None and Path(target).suffix not in {".yaml", ".yml"}:
         raise InputError(f"{target}: a calibration for {to} ends in .yaml or .yml; name it so")
     found = noise

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from gfimu.base.declared import Declared, figure, struct_of, structs_of
-from gfimu.base.errors import unknown_name
+from gfimu.base.errors import check_name
 from gfimu.base.files.outputs import JSON_SCHEMA
 from gfimu.base.files.schema import about
 from gfimu.commands.shell.completion import beginning
@@ -123,8 +123,7 @@ def schema(command: Annotated[str, _COMMAND], *, out: Annotated[str | Path | Non
     from gfimu.base.files.atomic_file import write_text
 
     name = " ".join(command.split())
-    if name not in schema_names():
-        raise unknown_name("command", name, schema_names())
+    check_name("command", name, schema_names())
     kinds, parts = _kinds(name)
     references, definitions = msgspec.json.schema_components(
         [*kinds, struct_of(Failed), *parts], ref_template="#/$defs/{name}"

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Protocol, cast
 
-from gfimu.base.errors import InputError, unknown_name
+from gfimu.base.errors import InputError, check_name
 from gfimu.base.plugins import plugins
 
 if TYPE_CHECKING:
@@ -125,8 +125,7 @@ def rate_method(name: str) -> RateMethod:
     if name in RATE_METHODS:
         return RATE_METHODS[name]
     known = {**RATE_METHODS, **plugins("gfimu.estimators", RateMethod, RATE_METHODS)}
-    if name not in known:
-        raise unknown_name("method", name, known)
+    check_name("method", name, known)
     return known[name]
 
 

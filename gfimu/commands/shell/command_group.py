@@ -8,7 +8,7 @@ from typing import Any
 import typer
 from typer.completion import install_callback, show_callback
 
-from gfimu.base.errors import unknown_name
+from gfimu.base.errors import check_name
 from gfimu.commands.shell.assemble import shell_command
 from gfimu.commands.shell.command import CommandApp, GfimuGroup, RunGroup
 from gfimu.commands.shell.command_list import COMMANDS, JOBS, declared_commands, help_line
@@ -42,8 +42,7 @@ class CommandGroup(GfimuGroup):
         """Parse the arguments; ``help COMMAND`` is ``COMMAND --help``, and a shell may be named for its completion."""
         ctx.meta[JSON_ASKED] = "--json" in args
         if len(args) == 2 and args[0] in _COMPLETION:  # Typer would ignore the name and take the shell that it detects
-            if args[1] not in _SHELLS:
-                raise unknown_name("shell", args[1], _SHELLS)
+            check_name("shell", args[1], _SHELLS)
             _COMPLETION[args[0]](ctx, None, args[1])  # type: ignore[arg-type]
         if args and args[0] == _HELP:
             args = [*args[1:], "--help"]

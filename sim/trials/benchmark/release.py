@@ -17,7 +17,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from gfimu.base.declared import Declared, figure
-from gfimu.base.errors import InputError, unknown_name
+from gfimu.base.errors import InputError, check_name
 
 __all__ = [
     "MEASURED",
@@ -208,10 +208,8 @@ def cases(set_name: str, split: str) -> tuple[Case, ...]:
     InputError
         If there is no such set or split.
     """
-    if set_name not in SETS:
-        raise unknown_name("set", set_name, SETS)
-    if split not in SPLITS:
-        raise unknown_name("split", split, SPLITS)
+    check_name("set", set_name, SETS)
+    check_name("split", split, SPLITS)
     if set_name == "own":
         made = _made("own", split, ["campaign"], _drawn("own", split, _LIBRARY, {1: 35, 2: 12, 0: 13}))
     elif set_name == "independent":
