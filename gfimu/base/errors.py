@@ -5,6 +5,8 @@ from __future__ import annotations
 import difflib
 import os
 import re
+import sys
+import warnings
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
@@ -26,8 +28,10 @@ __all__ = [
     "one_line",
     "printable",
     "unknown_name",
+    "warn",
 ]
 
+_PACKAGES = ("gfimu", "sim", "firmware_bridge")
 _LONGEST = 2000  # numerical: characters of a message
 _BREAKS = re.compile("[ \t]*[\n\r\v\f\x1c-\x1e\x85\u2028\u2029]+[ \t]*|\t")
 _CONTROL = re.compile(  # categories Cc, Cf, Cs, Zl and Zp of Unicode, without tab and line feed
@@ -119,6 +123,14 @@ def naming(source: str) -> Iterator[None]:
         if not source or source in str(error):
             raise
         raise type(error)(f"{source}: {error}") from None
+
+
+def warn(text: str, category: type[GfimuWarning] = RecordingWarning) -> None:
+    """Warn of something at the line outside of these packages that called them: the one that the user can change."""
+    level, frame = 1, sys._getframe()
+    while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] in _PACKAGES:
+        level, frame = level + 1, frame.f_back
+    warnings.warn(text, category, stacklevel=level)
 
 
 def check_name(kind: str, name: str, valid: Iterable[str]) -> None:

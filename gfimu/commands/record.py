@@ -13,12 +13,11 @@ gfimu record --find --self-test --out run.parquet
 gfimu record --port "klipper:///tmp/klippy_uds?chip=hotend,bed" --array pair.toml --out run.parquet
 """
 
-import warnings
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from gfimu.base.errors import InputError, RecordingWarning
+from gfimu.base.errors import InputError, warn
 from gfimu.base.optional_packages import require
 from gfimu.commands.record_settings import BoardSettings, RecordCallbacks
 from gfimu.commands.shell.declare import Group, Option, command
@@ -175,7 +174,7 @@ def record(
         if view is not None:
             view.close(keep=keep)
     for text in array_doubts(report, samples, form, known):
-        warnings.warn(f"{report.path}: {text}", RecordingWarning, stacklevel=2)
+        warn(f"{report.path}: {text}")
     faults = () if view is None else view.faults
     return replace(report, faults=tuple(entry for fault in faults for entry in fault.entries()))
 

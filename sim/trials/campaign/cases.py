@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from functools import partial
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 import numpy as np
 
-from gfimu.base.errors import InputError, RecordingWarning, check_name, unknown_name
+from gfimu.base.errors import InputError, check_name, unknown_name, warn
 from sim.trials.campaign.drive import DriveWork, as_toml
 
 if TYPE_CHECKING:
@@ -144,7 +143,7 @@ def check_factors(plan: PlanFile, first: Case, source: str) -> None:
             others = ((other, one) for other, one in _listed(plan) if other != name)
             if error and all(_refusal(check, first, {name: value, other: one}) for other, one in others):
                 text = f"{source}: [factors]: every case with {name} = {value!r} will fail: {error}"
-                warnings.warn(text, RecordingWarning, stacklevel=2)
+                warn(text)
     except InputError as error:
         raise InputError(f"{source}: [factors]: {error}") from None
 
