@@ -10,13 +10,11 @@ import functools
 import math
 import types
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import KW_ONLY, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Union, get_args, get_origin, get_type_hints
 
 import msgspec
-
-from gfimu.base.files.schema import about
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -47,22 +45,15 @@ Numbers = list[Number]
 Matrix = list[list[Number]]
 
 
-def figure(
-    meaning: str,
-    unit: str = "",
-    *,
-    head: str = "",
-    form: str = "",
-    key: str = "",
-    absent: bool = False,
-    flat: bool = False,
-    in_json: bool = True,
-    parts: Sequence[str] = ("x", "y", "z"),
-    before: str = "",
-    digits: str = "",
-    json: Any = None,
-) -> msgspec.Meta:
-    """Return what is known of a field of a result, for ``Annotated[type, figure(...)]``.
+_IN_NAMES = str.maketrans("/²³⁴⁵", "_2345")
+
+NEVER = "—"
+"""What a table shows for a number that is not finite."""
+
+
+@dataclass(frozen=True)
+class Key:
+    """What is known of a field of a result, for ``Annotated[type, figure(...)]``.
 
     Parameters
     ----------
@@ -75,7 +66,7 @@ def figure(
     form : str
         Format of its numbers in tables, by default four digits; or a text with ``{}`` in their place.
     key : str
-        Its name in JSON, where that is not the field's.
+        Its name in JSON, by default the field's.
     absent : bool
         Whether JSON leaves it out where it is None; otherwise it is null.
     flat : bool
@@ -88,62 +79,23 @@ def figure(
         Field before which JSON has it; otherwise fields stand in their order, properties behind them.
     digits : str
         Format whose digits JSON keeps of a number or of several; by default all.
-    json : type, optional
-        Its type in JSON where the field's own doesn't say it, such as `Matrix`.
-    """
-    shown = {"head": head, "form": form, "key": key, "absent": absent, "flat": flat, "json": json}
-    shown |= {"in_json": in_json, "parts": parts, "before": before, "digits": digits}
-    return about(meaning, unit, shown={name: value for name, value in shown.items() if value is not None})
-
-
-_IN_NAMES = str.maketrans("/²³⁴⁵", "_2345")
-
-NEVER = "—"
-"""What a table shows for a number that is not finite."""
-
-
-@dataclass(frozen=True)
-class Key:
-    """What is known of a field.
-
-    Parameters
-    ----------
-    key : str
-        Its name in JSON.
-    meaning, unit : str
-        What it says, and its unit as people read it.
-    head : str
-        Its heading in tables.
-    form : str
-        Format of its numbers in tables.
-    absent : bool
-        Whether JSON leaves it out where it is None; otherwise it is null.
-    flat : bool
-        Whether the keys of a nested result stand beside the others.
-    in_json : bool
-        Whether JSON has it; otherwise only tables do.
-    parts : sequence of str
-        Names of the components of a vector, for columns.
-    before : str
-        Field before which JSON has it; otherwise fields stand in their order, properties behind them.
-    digits : str
-        Format whose digits JSON keeps.
-    kind : object
-        Type of the field.
+    json : type
+        Its type in JSON, such as `Matrix`, where the field's own doesn't say it.
     """
 
-    key: str
     meaning: str
     unit: str = ""
+    _: KW_ONLY
     head: str = ""
     form: str = ""
+    key: str = ""
     absent: bool = False
     flat: bool = False
     in_json: bool = True
-    parts: Sequence[str] = ()
+    parts: Sequence[str] = ("x", "y", "z")
     before: str = ""
     digits: str = ""
-    kind: Any = None
+    json: Any = None
 
     def column(self, part: str) -> str:
         """Return the name of the column of a component: it stands before the unit."""
@@ -151,6 +103,10 @@ class Key:
         return (
             f"{self.key.removesuffix(unit)}{part}_{unit}" if unit and self.key.endswith(unit) else f"{self.key}_{part}"
         )
+
+
+figure = Key
+"""The key of a field, as results declare it."""
 
 
 @dataclass(frozen=True)
@@ -251,12 +207,9 @@ def _keys_of(cls: Any) -> Mapping[str, Key]:
                 hints[name] = get_type_hints(value.fget, include_extras=True).get("return")
     found = {}
     for name, hint in hints.items():
-        meta = next((one for one in getattr(hint, "__metadata__", ()) if isinstance(one, msgspec.Meta)), None)
-        if meta is not None:
-            known = meta.extra or {}
-            shown = {one.name: known[one.name] for one in fields(Key) if one.name in known}
-            kind = known.get("json", get_args(hint)[0])
-            found[name] = Key(**{**shown, "key": known.get("key") or name, "kind": kind})
+        mark = next((one for one in getattr(hint, "__metadata__", ()) if isinstance(one, Key)), None)
+        if mark is not None:
+            found[name] = replace(mark, key=mark.key or name, json=mark.json or get_args(hint)[0])
     order = list(found)
     for name, key in found.items():
         if key.before:
@@ -351,12 +304,12 @@ def _struct_of(cls: Any) -> type[msgspec.Struct]:
             continue
         if key.flat:
             known = {name for name, *_ in fields}
-            inner = msgspec.structs.fields(struct_of(_without_none(key.kind)))
+            inner = msgspec.structs.fields(struct_of(_without_none(key.json)))
             for one in (one for one in inner if one.name not in known):
                 missing = (one.type | msgspec.UnsetType, msgspec.UNSET)
                 fields.append((one.name, *(missing if key.absent else (one.type, one.default))))
             continue
-        kind = _json_type(key.kind)
+        kind = _json_type(key.json)
         meta = msgspec.Meta(description=f"{key.meaning} ({key.unit})" if key.unit else key.meaning)
         if key.absent:
             fields.append((key.key, Annotated[_without_none(kind) | msgspec.UnsetType, meta], msgspec.UNSET))
@@ -374,11 +327,11 @@ struct_of: Callable[[Any], type[msgspec.Struct]] = functools.cache(_struct_of)
 def structs_of(cls: type[Declared]) -> list[type[msgspec.Struct]]:
     """Return the struct of a result, and those that its schema names by reference only."""
     found = [struct_of(cls)]
-    waiting: list[Any] = [key.kind for key in cls.keys().values()]
+    waiting: list[Any] = [key.json for key in cls.keys().values()]
     while waiting:
         kind = waiting.pop()
         if isinstance(kind, type) and issubclass(kind, Declared):
-            waiting += [key.kind for key in kind.keys().values()]
+            waiting += [key.json for key in kind.keys().values()]
             continue
         if get_origin(kind) in (Union, types.UnionType) and len(several := _declared(get_args(kind))) > 1:
             found += [struct_of(one) for one in several]

@@ -6,10 +6,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-import msgspec
-
 from gfimu.array.array import AccelerometerArray
-from gfimu.base.declared import Declared, Table, figure, figures
+from gfimu.base.declared import Declared, Key, Table, figure, figures
 from gfimu.calibration.result import Calibration
 from gfimu.recording import Recording
 
@@ -29,11 +27,11 @@ class _Shown(Declared):
         yield figures(self.title, self)
 
 
-def _of_stream(what: str, unit: str = "") -> msgspec.Meta:
+def _of_stream(what: str, unit: str = "") -> Key:
     return figure(f"Of a MIMU4444 stream: {what}.", unit, head=what, absent=True)
 
 
-def _left_out(why: str) -> msgspec.Meta:
+def _left_out(why: str) -> Key:
     return figure(f"Rows left out {why}.", head=f"rows left out {why}", absent=True)
 
 

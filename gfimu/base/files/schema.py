@@ -47,7 +47,6 @@ def about(
     default: str = "",
     example: Any = None,
     must_be: str = "",
-    shown: Mapping[str, Any] | None = None,
     **limits: Any,
 ) -> msgspec.Meta:
     """Return what is known of a key, for ``Annotated[type, about(...)]``.
@@ -64,8 +63,6 @@ def about(
         A value for the message that the key is missing.
     must_be : str
         What the value must be, for messages, where the type does not say it well.
-    shown : mapping, optional
-        Of a result, how tables and JSON show it (`gfimu.base.declared.figure`).
     **limits
         Bounds of `msgspec.Meta`: ``gt``, ``ge``, ``lt``, ``le``, ``min_length``, ``max_length``, ``pattern``.
     """
@@ -73,7 +70,7 @@ def about(
     return msgspec.Meta(
         description=f"{meaning} ({unit})" if unit else meaning,
         examples=None if example is None else [example],
-        extra={key: value for key, value in notes.items() if value} | dict(shown or {}),
+        extra={key: value for key, value in notes.items() if value},
         **limits,
     )
 
