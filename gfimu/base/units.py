@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 
-from gfimu.base.errors import UnitError
-
 __all__ = [
     "GYRO_COLUMNS",
     "KEY_ENDINGS",
@@ -24,7 +22,6 @@ __all__ = [
     "is_usable",
     "key_name",
     "reference_quantity",
-    "split_unit",
 ]
 
 STANDARD_GRAVITY = 9.80665
@@ -129,17 +126,6 @@ def key_name(key: str, unit: str) -> str:
     if key == ending:
         return "value"
     return key.removesuffix(f"_{ending}") if ending else key
-
-
-def split_unit(column: str, quantity: str, units: dict[str, float] | dict[str, float | None]) -> str:
-    """Return the unit suffix of ``column`` for ``quantity``; raises `UnitError` listing the valid units."""
-    unit = column[len(quantity) + 1 :]
-    if unit not in units:
-        raise UnitError(
-            f"column {column!r}: unknown unit {unit!r} for {quantity}; valid: "
-            + ", ".join(f"{quantity}_{name}" for name in units)
-        )
-    return unit
 
 
 def duration_text(seconds: float) -> str:

@@ -70,8 +70,6 @@ def simulate(
     from sim.simulation import memory_of, summarise
     from sim.simulation import simulate as run_scenario
 
-    if seed < 0:
-        raise InputError(f"seed {seed}: must be zero or positive")
     if isinstance(scenario, Scenario):
         if changes:
             raise InputError("changes apply to a scenario file; change the Scenario object with dataclasses.replace")

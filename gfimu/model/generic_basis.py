@@ -23,7 +23,6 @@ __all__ = [
     "Motion",
     "basis_function",
     "is_of_time",
-    "ripple_order",
     "ripples",
     "step_at",
     "tone",
@@ -139,12 +138,6 @@ def tone(frequency: float, wave: str) -> str:
 def ripples(order: int) -> tuple[str, ...]:
     """Return the names of the functions that turn so many times per revolution."""
     return tuple(_ripples((order,)))
-
-
-def ripple_order(name: str) -> int | None:
-    """Return how many times per revolution a function turns; None where it is of something else."""
-    found = _RIPPLE_NAME.fullmatch(name)
-    return int(found[1]) if found else None
 
 
 def step_at(time: float) -> str:

@@ -29,7 +29,6 @@ Floats = NDArray[np.float64]
 _PERIODS = 4  # lowest frequency of the 1/f spectrum: one period in so many lengths of the record
 _POLES_PER_OCTAVE = 0.7  # covariances within 0.02 of the variance
 _LEVEL_STEP = 0.02  # levels of bias instability over white noise are rounded to this, relative
-_REGULARISATION = 1e-12  # numerical: variance of white noise of a process that has none
 
 
 @dataclass(frozen=True)
