@@ -1,4 +1,4 @@
-"""Shared fixtures; one thread of linear algebra and a share of the processors per process, as more collapse on few."""
+"""Shared fixtures; the same arithmetic everywhere, and a share of the processors per process."""
 
 import os
 import sys
@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-# NumPy reads these when it is first imported, which no import above does.
-for _variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ.setdefault(_variable, "1")
+from tests.arithmetic import set_arithmetic
+
+set_arithmetic()  # before NumPy is first imported, which no import above does
 
 # Each of several test processes keeps to its share of the processors, as a diagnosis takes all that it may.
 _share = os.environ.get("PYTEST_XDIST_WORKER", "")

@@ -19,11 +19,13 @@ from .calls import Outcome
 
 __all__ = ["digest"]
 
-MASKED_KEYS = {"software_version", "version", "python", "platform", "started_utc"}
+MASKED_KEYS = {
+    "software_version", "version", "python", "platform", "started_utc", "processor_s", "processor_s_median",
+}  # fmt: skip
 """Keys whose values vary with the version, the machine and the day."""
 
-MASKED_WORDS = (str(Path(gfimu.__file__).parents[1]), r"(?<=127\.0\.0\.1:)\d+")
-"""Parts of texts that vary, besides the scratch folder: the place of the checkout, a port. Regular expressions."""
+MASKED_WORDS = (str(Path(gfimu.__file__).parents[1]), r"(?<=127\.0\.0\.1:)\d+", r"(?<=\"processor_s\":)[\d.]+")
+"""Parts of texts that vary, besides the scratch folder: the checkout's place, a port, a time. Regular expressions."""
 
 LONG = 24  # numbers; of a longer list `VALUES` are stored, evenly spread, with its shape and root mean square
 VALUES = 20
