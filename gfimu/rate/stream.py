@@ -39,7 +39,7 @@ __all__ = [
 ]
 
 _START_S = 3.0  # of a stream, which are examined
-_FEWEST, _MOST = 50, 5000  # samples of that start
+_FEWEST, _MOST = 50, 5000  # numerical: samples of that start, whatever the rate
 
 
 class StreamFilter(Protocol):

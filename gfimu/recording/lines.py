@@ -59,7 +59,7 @@ def source_lines(
 def _socket_lines(source: str, host: str, port: int) -> Iterator[str]:
     """Yield the lines that a TCP server sends."""
     try:
-        connection = socket.create_connection((host, port), timeout=10)
+        connection = socket.create_connection((host, port), timeout=10)  # numerical: s
     except OSError as error:
         raise InputError(f"--from {source!r}: {error.strerror or error}; start the server first") from None
     connection.settimeout(None)

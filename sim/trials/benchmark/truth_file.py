@@ -101,10 +101,7 @@ def task_of(world: str) -> Task:
 
 
 def write_tasks(
-    worlds: Sequence[str],
-    out: str | Path,
-    file_type: str = "parquet",
-    progress: Callable[[int, int], None] | None = None,
+    worlds: Sequence[str], out: str | Path, file_type: str, progress: Callable[[int, int], None] | None = None
 ) -> list[Path]:
     """Write what a method is given of worlds as plain files, a folder each, and the schema of answers.
 
