@@ -4,20 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from gfimu.array.array import AccelerometerArray
 from gfimu.base.results.colours import chip_colour
+from gfimu.recording import Recording
 from gfimu.visual.rig import is_cube, stand_height
 from gfimu.visual.scene import Box, Cylinder, Mesh, Shape
 from sim.rigs.rig_model import turntable_model
+from sim.scenarios import Scenario
+from sim.truth import known_motion
 from sim.world import World
 
-__all__ = ["array_on_axis", "rig_drawing"]
+__all__ = ["draw_simulated", "rig_drawing"]
 
 _FOOT = "adapter"
 _BOARD = 0.004  # half size, m: boards are larger, the packages on them smaller
@@ -55,20 +58,25 @@ def rig_drawing(world: World) -> Mapping[str, Sequence[Shape]]:
     return {name: drawn for name, drawn in shapes.items() if name != "cube" or is_cube(world.array)}
 
 
-def array_on_axis(world: World) -> tuple[AccelerometerArray, NDArray[np.float64]] | None:
-    """Return the array with the axis of a pendulum or a wheel, for its picture; None on a table.
+def draw_simulated(path: str | Path, scenario: Scenario, recording: Recording) -> None:
+    """Write what was simulated as a rerun recording.
 
-    Returns
-    -------
-    (AccelerometerArray, ndarray of shape (3,)) or None
-        The array with its turning axis in the body frame, and how far up the picture is moved, m, so that all of the
-        body's circle is above the ground. None where the axis leans less than 0.2 rad: it is a table's.
+    It is drawn on its turntable, about a level or inclined axis, on a carriage, or free. About an axis that leans
+    0.2 rad or more (a pendulum's, a wheel's) it is moved up so that all of the body's circle is above the ground.
     """
-    axis = world.leaning_axis()
-    if axis is None:
-        return None
-    arm = float(np.linalg.norm(world.cube_offset))
-    return replace(world.array, turning_axis=axis), np.array([0.0, 0.0, arm + stand_height(world.array)])
+    from gfimu.visual import write_run  # needs rerun, and the shapes alone do not
+
+    array, known, world = scenario.array, known_motion(recording), scenario.world
+    axis = None if scenario.free else world.leaning_axis()
+    if axis is not None:
+        array = replace(array, turning_axis=axis)
+        lift = np.array([0.0, 0.0, float(np.linalg.norm(world.cube_offset)) + stand_height(world.array)])
+        known = replace(known, position=known.position + lift)
+    on_table = not scenario.free and axis is None and world.slide is None
+    if recording.unit != "m_s2":
+        recording = replace(recording, readings=recording.readings * recording.metadata["lsb_m_s2"], unit="m_s2")
+    shapes = rig_drawing(world) if on_table else None
+    write_run(path, recording, array, known=known, shapes=shapes, title=scenario.name)
 
 
 def _group(model: mujoco.MjModel, body: int) -> str:

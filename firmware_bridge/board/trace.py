@@ -15,7 +15,7 @@ from gfimu.base.files.atomic_file import atomic_path
 from gfimu.base.files.rerun_stream import rrd_stream
 from gfimu.base.results import TableResult, one_row
 
-__all__ = ["Event", "EventList", "TraceCounts", "write_rrd", "write_vcd"]
+__all__ = ["Event", "EventList", "TraceCounts", "write_rrd", "write_trace", "write_vcd"]
 
 _PICOSECONDS = 1_000_000_000_000
 _NAMES = {2: "NMI", 3: "HardFault", 11: "SVCall", 14: "PendSV", 15: "SysTick"}
@@ -96,6 +96,14 @@ def exception_name(number: int) -> str:
     if number >= 16 and number - 16 < len(_IRQS):
         return _IRQS[number - 16]
     return _NAMES.get(number, f"exception{number}")
+
+
+def write_trace(path: str | Path, events: Sequence[Event]) -> TraceCounts:
+    """Write a value change dump (``.vcd``) or a rerun recording, and return what it holds."""
+    file, sources = Path(path), [event.source for event in events]
+    (write_vcd if file.suffix == ".vcd" else write_rrd)(file, events)
+    accesses = len(events) - sources.count("cpu")
+    return TraceCounts(len(events), accesses, sum(event.kind == "enter" for event in events))
 
 
 def write_vcd(path: str | Path, events: Sequence[Event]) -> None:

@@ -16,7 +16,7 @@ from firmware_bridge.frames.packets import PacketLayout, StreamLayout
 from firmware_bridge.frames.text_lines import TextLayout
 from gfimu.array.array import AccelerometerArray
 from gfimu.array.parts.part_file import PartFile
-from gfimu.base.errors import InputError, unknown_name
+from gfimu.base.errors import InputError, check_name
 from gfimu.base.files.model_files import find_model, read_toml
 from gfimu.base.files.schema import Positive, Table, about, read
 
@@ -174,8 +174,7 @@ def _packet(spec: Packet, source: str) -> tuple[StreamLayout, Collection[str], i
         raise InputError(f"{source}: [stream]: field 'temperature': one number for the board; leave its count out")
     if len(set(names)) != len(names):
         raise InputError(f"{source}: [stream]: fields {', '.join(names)}: two have the same name")
-    if spec.checksum not in CHECKSUMS:
-        raise unknown_name("checksum", spec.checksum, CHECKSUMS)
+    check_name("checksum", spec.checksum, CHECKSUMS)
     rule = CHECKSUMS[spec.checksum]
     kinds: list[Any] = [
         (one.name, _numpy_type(one.type, order), (one.count,)) if one.count > 1 or one.name == "counts"

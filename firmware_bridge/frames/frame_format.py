@@ -21,6 +21,7 @@ from firmware_bridge.frames.commands import (
 )
 from firmware_bridge.frames.packets import PacketLayout, StreamLayout
 from gfimu.array.array import AccelerometerArray
+from gfimu.array.parts.part import Part
 from gfimu.base.errors import InputError
 
 __all__ = [
@@ -182,6 +183,10 @@ class FrameFormat:
     dialogue: Dialogue | None = None
     temperature: TemperatureField | None = None
     array_is_assumed: bool = False
+
+    def count_size(self, array: AccelerometerArray) -> float:
+        """Return the size of a count, m/s²: its own, or that of the part of the array's first chip."""
+        return self.count_m_s2 or Part.load(array.chips[0].part, array.part_files).lsb
 
     def for_array(self, array: AccelerometerArray) -> FrameFormat:
         """Return this format for an array of its own number of channels, or of fewer chips where one may be missing.

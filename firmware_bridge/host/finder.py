@@ -13,7 +13,7 @@ from firmware_bridge.host.link import Chunk, Link
 from gfimu.base.declared import Declared, figure
 from gfimu.base.errors import InputError
 
-__all__ = ["SPEEDS", "Found", "Listener", "find_boards", "has_speed", "search_speed"]
+__all__ = ["SPEEDS", "Found", "Listener", "boards_on", "find_boards", "has_speed", "search_speed"]
 
 SPEEDS = (115_200, 1_562_500, 921_600, 460_800, 1_000_000, 230_400, 57_600, 9_600)
 """Speeds to try, the usual ones first, bits per second."""
@@ -146,6 +146,24 @@ def find_boards(
         if result is not None:
             found.append(result[0])
     return found
+
+
+def boards_on(port: str = "", form: str = "", *, on_try: Callable[[str], None] | None = None) -> list[Found]:
+    """Return the boards on a port, or on all, that have a format, or any; at least one.
+
+    Raises
+    ------
+    InputError
+        If there is no board, or the port can't be opened.
+    """
+    boards = find_boards([port] if port else [], [form] if form else [], on_try=on_try)
+    if not boards:
+        speeds = ", ".join(str(speed) for speed in sorted(SPEEDS))
+        raise InputError(
+            f"{port or 'serial ports'}: no board answers or sends {form or 'a known format'} at {speeds} baud; "
+            "check power, cable and --format (docs/how_to/bench.md)"
+        )
+    return boards
 
 
 def has_speed(port: str) -> bool:

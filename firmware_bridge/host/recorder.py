@@ -30,7 +30,6 @@ from firmware_bridge.host.record_report import RecordReport
 from firmware_bridge.host.record_session import Batch, RecordSession, SampleClock
 from firmware_bridge.sources.ports import port_format
 from gfimu.array.array import AccelerometerArray
-from gfimu.array.parts.part import Part
 from gfimu.base.errors import GfimuError, InputError
 from gfimu.base.files.outputs import RECORDING, check_outputs
 from gfimu.base.version import __version__
@@ -182,11 +181,10 @@ def record(
 def _metadata(port: str, layout: FrameFormat, on_board: ArrayOnBoard) -> dict[str, Any]:
     """Return what a recording says of its board from the start."""
     array = on_board.array
-    part = array.chips[0].part
     return {
         **({} if on_board.known is None else array_metadata(array)),
-        "part": part,
-        "lsb_m_s2": layout.count_m_s2 or Part.load(part, array.part_files).lsb,
+        "part": array.chips[0].part,
+        "lsb_m_s2": layout.count_size(array),
         "port": port,
         "format": layout.name,
         "started_utc": datetime.now(UTC).isoformat(timespec="milliseconds"),

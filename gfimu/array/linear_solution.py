@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from gfimu.array.array import AccelerometerArray
 from gfimu.array.kinematics import joint_form, null_space, omega_leakage, omega_products, pseudo_inverse
-from gfimu.base.errors import GeometryError, unknown_name
+from gfimu.base.errors import GeometryError, check_name
 from gfimu.base.short_repr import short_repr
 
 __all__ = ["FORMS", "LinearSolution", "linear_solution"]
@@ -117,8 +117,7 @@ def linear_solution(
     GeometryError
         If the array can't see all six motions (the message names those it can't), or does not allow the form.
     """
-    if form not in FORMS:
-        raise unknown_name("form", form, FORMS)
+    check_name("form", form, FORMS)
     used, inverse, leakage = _solve(array, form)
     n = len(readings)
     motion = np.full((n, 6), np.nan)

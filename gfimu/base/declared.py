@@ -66,7 +66,7 @@ class Key:
     form : str
         Format of its numbers in tables, by default four digits; or a text with ``{}`` in their place.
     key : str
-        Its name in JSON, where that is not the field's.
+        Its name in JSON, by default the field's.
     absent : bool
         Whether JSON leaves it out where it is None; otherwise it is null.
     flat : bool

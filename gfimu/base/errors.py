@@ -5,6 +5,8 @@ from __future__ import annotations
 import difflib
 import os
 import re
+import sys
+import warnings
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
@@ -19,6 +21,7 @@ __all__ = [
     "RecordingWarning",
     "UnitError",
     "WriteError",
+    "check_name",
     "did_you_mean",
     "naming",
     "nearest_name",
@@ -26,8 +29,10 @@ __all__ = [
     "printable",
     "system_errors",
     "unknown_name",
+    "warn",
 ]
 
+_PACKAGES = ("gfimu", "sim", "firmware_bridge")
 _LONGEST = 2000  # numerical: characters of a message
 _BREAKS = re.compile("[ \t]*[\n\r\v\f\x1c-\x1e\x85\u2028\u2029]+[ \t]*|\t")
 _CONTROL = re.compile(  # categories Cc, Cf, Cs, Zl and Zp of Unicode, without tab and line feed
@@ -128,6 +133,20 @@ def system_errors(source: object, remedy: str = "check the path") -> Iterator[No
         yield
     except OSError as error:
         raise InputError(f"{source}: {error.strerror or error}; {remedy}") from None
+
+
+def warn(text: str, category: type[GfimuWarning] = RecordingWarning) -> None:
+    """Warn of something at the line outside of these packages that called them: the one that the user can change."""
+    level, frame = 1, sys._getframe()
+    while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] in _PACKAGES:
+        level, frame = level + 1, frame.f_back
+    warnings.warn(text, category, stacklevel=level)
+
+
+def check_name(kind: str, name: str, valid: Iterable[str]) -> None:
+    """Refuse a name that is not in a list; ``kind`` is what it names."""
+    if name not in valid:
+        raise unknown_name(kind, name, valid)
 
 
 def unknown_name(kind: str, name: str, valid: Iterable[str]) -> InputError:

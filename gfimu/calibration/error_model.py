@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gfimu.base.errors import InputError, unknown_name
+from gfimu.base.errors import InputError, check_name, unknown_name
 
 __all__ = ["GAUGES", "ErrorModel", "free_elements"]
 
@@ -41,8 +41,7 @@ def free_elements(gauge: str) -> tuple[tuple[int, int], ...]:
     InputError
         If the gauge is unknown; the message lists the gauges.
     """
-    if gauge not in GAUGES:
-        raise unknown_name("gauge", gauge, GAUGES)
+    check_name("gauge", gauge, GAUGES)
     return {"x_axis": _LOWER, "z_axis": _UPPER}.get(gauge, _FULL)
 
 

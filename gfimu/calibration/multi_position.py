@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.array.gravity import EARTH_RATE
-from gfimu.base.errors import unknown_name
+from gfimu.base.errors import check_name
 from gfimu.calibration.coverage import check_magnitude_coverage, fit_sphere, pose_directions
 from gfimu.calibration.error_model import ErrorModel, free_elements
 from gfimu.calibration.fit_quality import covariance_scale
@@ -74,8 +74,7 @@ def multi_position(
     InputError
         If the poses are too few or too similar; the message says which to add.
     """
-    if weighting not in WEIGHTINGS:
-        raise unknown_name("weighting", weighting, WEIGHTINGS)
+    check_name("weighting", weighting, WEIGHTINGS)
     check_magnitude_coverage(pose_directions(observations.means))
     adjustment = _adjust(observations, gravity, gauge, weighting, start or _coarse_start(observations, gravity))
     factor, redundancy = pose_variance_factor(observations, adjustment, gravity, gauge)

@@ -15,7 +15,7 @@ import numpy as np
 import pywt
 from numpy.typing import ArrayLike, NDArray
 
-from gfimu.base.errors import InputError, unknown_name
+from gfimu.base.errors import InputError, check_name
 from gfimu.recording import Recording
 from gfimu.recording.rest import Rest, mean_variance_factor
 
@@ -123,8 +123,7 @@ class Observations:
 
     def of_chip(self, chip: str) -> Observations:
         """Return the observations of one chip; raises `InputError` that lists the chips."""
-        if chip not in self.chips:
-            raise unknown_name("chip", chip, self.chips)
+        check_name("chip", chip, self.chips)
         place = 3 * self.chips.index(chip)
         columns = slice(place, place + 3)
         return replace(
@@ -208,10 +207,8 @@ def denoised_samples(
     InputError
         If the wavelet or threshold is unknown, or the level out of range.
     """
-    if wavelet not in pywt.wavelist(kind="discrete"):
-        raise unknown_name("wavelet", wavelet, pywt.wavelist(kind="discrete"))
-    if threshold not in THRESHOLDS:
-        raise unknown_name("threshold", threshold, THRESHOLDS)
+    check_name("wavelet", wavelet, pywt.wavelist(kind="discrete"))
+    check_name("threshold", threshold, THRESHOLDS)
     if not 1 <= level <= _DEEPEST:
         raise InputError(f"wavelet level {level}: give 1 to {_DEEPEST}")
     observations = _build(recording, rest, "wavelet")
@@ -247,8 +244,7 @@ def observations_from(recording: Recording, rest: Rest, kind: str, **options: An
     InputError
         If there is no such input (the message lists the inputs), or it has no such option.
     """
-    if kind not in INPUTS:
-        raise unknown_name("input", kind, INPUTS)
+    check_name("input", kind, INPUTS)
     if options and kind != "wavelet":
         raise InputError("--wavelet-level and --wavelet-threshold are of the wavelet input; add --input wavelet")
     return INPUTS[kind](recording, rest, **options)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from gfimu.base.errors import unknown_name
+from gfimu.base.errors import check_name
 from gfimu.calibration.array_calibration import calibrate_array
 from gfimu.calibration.method import CalibrationMethod
 from gfimu.calibration.multi_position import multi_position, multi_position_gyro
@@ -109,6 +109,5 @@ METHODS: Mapping[str, CalibrationMethod] = MappingProxyType({method.name: method
 
 def calibration_method(name: str) -> CalibrationMethod:
     """Look up a calibration method; raises `InputError` that lists the methods."""
-    if name not in METHODS:
-        raise unknown_name("calibration method", name, METHODS)
+    check_name("calibration method", name, METHODS)
     return METHODS[name]

@@ -15,17 +15,14 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from gfimu.base.errors import InputError, unknown_name
+from gfimu.base.errors import InputError
 from gfimu.base.files.outputs import OutputFile, OutputFolder
 from gfimu.base.optional_packages import require
 from gfimu.commands.shell.declare import Option, command
 from gfimu.commands.shell.options import DATA, LIMIT, SETS, SPLIT, WORKERS
-from gfimu.model.user_code import user_function
 
 if TYPE_CHECKING:
-    from gfimu.commands.benchmark_results import BenchmarkList, BenchmarkRun, BenchmarkWorlds
-    from sim.trials.benchmark.answer import Answer
-    from sim.trials.benchmark.judged import Judged
+    from sim.trials.benchmark.results import BenchmarkList, BenchmarkRun, BenchmarkWorlds
     from sim.trials.benchmark.table import Judgement
 
 __all__ = ["benchmark_list", "judge", "run", "table", "worlds"]
@@ -33,20 +30,31 @@ __all__ = ["benchmark_list", "judge", "run", "table", "worlds"]
 OWN = "gfimu"
 """Name of the project's own method."""
 
-_DRAWN = ("own", "independent", "unlisted", "dcmotor")
 _ANSWERS = "answers.jsonl"
 _SCHEMA = "answer.schema.json"
-_LINES = OutputFile("a file of judged answers", (".jsonl", ".xz"))
 _PROGRESS = Option("Called with the number of worlds that are done and of all.", shell=False)
+_TYPE = Option("Type of the recordings.", "TYPE")
+_WORLDS = Option(
+    "Folder to write: a folder per world, such as own/dev/007, and the schema of answers.", "FOLDER",
+    writes=OutputFolder((_SCHEMA,)),
+)  # fmt: skip
+_METHOD = Option("FILE.py:function, or a method that comes with the benchmark.", "METHOD", argument=True)
+_RUN = Option(
+    "Folder to write; one that was begun is continued.", "FOLDER", writes=OutputFolder(("plan.toml", _ANSWERS))
+)
+_NAME = Option("Name in tables; that of the file by default.", "NAME")
+_GIVEN = Option(
+    "Answers (.jsonl, .jsonl.xz), or folders of runs.", "ANSWERS...", kind=list[Path], argument=True, reads=True
+)
+_LINES = OutputFile("a file of judged answers", (".jsonl", ".xz"))
+_JUDGED = Option("File to write: judged answers (.jsonl or .jsonl.xz).", "FILE", writes=_LINES, what="judged")
+_PARTIAL = Option("Leave out worlds without an answer, instead of counting them as errors.")
+_RESULTS = Option(
+    "Judged answers, as judge --out writes them.", "RESULTS...", kind=list[Path], argument=True, reads=True
+)
 
 
-def _of_list() -> tuple[type, ...]:
-    from gfimu.commands.benchmark_results import BenchmarkList
-
-    return (BenchmarkList,)
-
-
-@command("benchmark list", results=_of_list)
+@command("benchmark list")
 def benchmark_list() -> "BenchmarkList":
     """List the sets of the benchmark, their sizes and licences, and the methods that come with it.
 
@@ -65,47 +73,32 @@ def benchmark_list() -> "BenchmarkList":
     # Hash of the release, sets and methods for a program
     gfimu benchmark list --json
     """
-    from gfimu.commands.benchmark_results import BenchmarkList
     from sim.trials.benchmark.baselines import BASELINES
     from sim.trials.benchmark.release import RELEASE, SETS, release_hash
+    from sim.trials.benchmark.results import BenchmarkList
 
     return BenchmarkList(RELEASE, release_hash(), tuple(SETS.values()), (OWN, *BASELINES))
 
 
-def _of_worlds() -> tuple[type, ...]:
-    from gfimu.commands.benchmark_results import BenchmarkWorlds
-
-    return (BenchmarkWorlds,)
-
-
 def _written_worlds(folders: list[Path], given: Any) -> "BenchmarkWorlds":
-    from gfimu.commands.benchmark_results import BenchmarkWorlds
+    from sim.trials.benchmark.results import BenchmarkWorlds
 
     return BenchmarkWorlds(tuple(str(folder.relative_to(given["out"])) for folder in folders))
 
 
 @command(
     "benchmark worlds",
-    results=_of_worlds,
     report=_written_worlds,
     files=lambda _, given: {"worlds": given["out"], "schema": given["out"] / _SCHEMA},
     doing="worlds",
 )
 def worlds(
-    out: Annotated[
-        str | Path,
-        Option(
-            "Folder to write: a folder per world, such as own/dev/007, and the schema of answers.",
-            "FOLDER",
-            kind=Path,
-            writes=OutputFolder((_SCHEMA,)),
-        ),
-    ],
+    out: Annotated[str | Path, _WORLDS],
     *,
     sets: Annotated[Sequence[str], SETS] = (),
     split: Annotated[Literal["dev", "test"], SPLIT] = "dev",
     limit: Annotated[int | None, LIMIT] = None,
-    file_type: Annotated[Literal["parquet", "csv"], Option("Type of the recordings.", "TYPE")] = "parquet",
+    file_type: Annotated[Literal["parquet", "csv"], _TYPE] = "parquet",
     progress: Annotated[Callable[[int, int], None] | None, _PROGRESS] = None,
 ) -> list[Path]:
     """Write worlds as plain files, for a method in any language: a recording and a twin each, no truth.
@@ -126,61 +119,27 @@ def worlds(
     # A few, as text
     gfimu benchmark worlds --out worlds --sets own --limit 5 --file-type csv
     """
-    import json
-
-    from gfimu.base.files.atomic_file import write_text
-
     require("gfimu benchmark", "mujoco")
-    from sim.trials.benchmark.answer import answer_schema
-    from sim.trials.benchmark.release import cases
-    from sim.trials.benchmark.truth_file import task_of
+    from sim.trials.benchmark.release import chosen_cases
+    from sim.trials.benchmark.truth_file import write_tasks
 
-    listed = [case.world for name in _chosen(sets) for case in cases(name, split)[:limit]]
-    folders = []
-    for number, world in enumerate(listed, start=1):
-        task, folder = task_of(world), Path(out) / world
-        folder.mkdir(parents=True, exist_ok=True)
-        task.recording.write(folder / f"recording.{file_type}")
-        write_text(folder / "twin.toml", task.twin.to_toml())
-        folders.append(folder)
-        if progress is not None:
-            progress(number, len(listed))
-    Path(out).mkdir(exist_ok=True)
-    write_text(Path(out) / _SCHEMA, json.dumps(answer_schema(), indent=2) + "\n")
-    return folders
-
-
-def _of_run() -> tuple[type, ...]:
-    from gfimu.commands.benchmark_results import BenchmarkRun
-
-    return (BenchmarkRun,)
+    return write_tasks([case.world for case in chosen_cases(sets, split, limit)], out, file_type, progress)
 
 
 @command(
     "benchmark run",
-    results=_of_run,
     files=lambda run, _: {"answers": run.answers},
     doing=lambda given: f"benchmark {given['method']}",
     continues=True,
 )
 def run(
-    method: Annotated[
-        str, Option("FILE.py:function, or a method that comes with the benchmark.", "METHOD", argument=True)
-    ],
+    method: Annotated[str, _METHOD],
     *,
-    out: Annotated[
-        str | Path,
-        Option(
-            "Folder to write; one that was begun is continued.",
-            "FOLDER",
-            kind=Path,
-            writes=OutputFolder(("plan.toml", _ANSWERS)),
-        ),
-    ],
+    out: Annotated[str | Path, _RUN],
     sets: Annotated[Sequence[str], SETS] = (),
     split: Annotated[Literal["dev", "test"], SPLIT] = "dev",
     limit: Annotated[int | None, LIMIT] = None,
-    name: Annotated[str, Option("Name in tables; that of the file by default.", "NAME")] = "",
+    name: Annotated[str, _NAME] = "",
     workers: Annotated[int | None, WORKERS] = None,
     data: Annotated[str | Path | None, DATA] = None,
     progress: Annotated[Callable[[int, int], None] | None, _PROGRESS] = None,
@@ -207,21 +166,20 @@ def run(
     """
     require("gfimu benchmark", "mujoco")
     from gfimu.commands.benchmark_engine import answer
-    from gfimu.commands.benchmark_results import BenchmarkRun
     from sim.trials.benchmark.answer import write_answers
     from sim.trials.benchmark.methods import BASELINE_METHODS, answers_of, benchmark_plan, benchmark_work, named_method
+    from sim.trials.benchmark.results import BenchmarkRun
     from sim.trials.sweep.dataset import Dataset
     from sim.trials.sweep.engine import run_campaign
     from sim.trials.sweep.executors import open_workers, processors
 
-    for option, value in (("--workers", workers), ("--limit", limit)):
-        if value is not None and value < 1:
-            raise InputError(f"{option} {value}: must be at least 1")
+    if workers is not None and workers < 1:
+        raise InputError(f"--workers {workers}: must be at least 1")
     reference, own = named_method(method, {OWN: answer, **BASELINE_METHODS})  # before anything is written
-    dataset = Dataset.create(out, benchmark_plan(reference, _chosen(sets), split, limit, _folder(data)))
+    dataset = Dataset.create(out, benchmark_plan(reference, sets, split, limit, _folder(data)))
     work = functools.partial(benchmark_work, own=own)
     run_campaign(dataset, work, functools.partial(open_workers, workers or processors()), progress=progress)
-    called = name or (method if ".py:" not in method else f"{Path(method.rpartition(':')[0]).stem}")
+    called = name or (Path(method.rpartition(":")[0]).stem if ".py:" in method else method)
     answers = answers_of(dataset, called)
     path = dataset.folder / _ANSWERS
     write_answers(answers, path)
@@ -229,30 +187,12 @@ def run(
     return BenchmarkRun(dataset.folder, path, called, len(answers), failed)
 
 
-def _of_judgement() -> tuple[type, ...]:
-    from sim.trials.benchmark.table import Judgement
-
-    return (Judgement,)
-
-
-@command("benchmark judge", results=_of_judgement)
+@command("benchmark judge")
 def judge(
-    answers: Annotated[
-        str | Path | Sequence[str | Path],
-        Option(
-            "Answers (.jsonl, .jsonl.xz), or folders of runs.",
-            "ANSWERS...",
-            kind=list[Path],
-            argument=True,
-            reads=True,
-        ),
-    ],
+    answers: Annotated[str | Path | Sequence[str | Path], _GIVEN],
     *,
-    out: Annotated[
-        str | Path | None,
-        Option("File to write: judged answers (.jsonl or .jsonl.xz).", "FILE", kind=Path, writes=_LINES, what="judged"),
-    ] = None,
-    partial: Annotated[bool, Option("Leave out worlds without an answer, instead of counting them as errors.")] = False,
+    out: Annotated[str | Path | None, _JUDGED] = None,
+    partial: Annotated[bool, _PARTIAL] = False,
     data: Annotated[str | Path | None, DATA] = None,
 ) -> "Judgement":
     """Judge answers by the truth: right, in a set, unknown, missed, wrong; sizes, prediction, time.
@@ -269,27 +209,21 @@ def judge(
     gfimu benchmark judge answers.jsonl --partial
     """
     require("gfimu benchmark", "mujoco")
+    from sim.trials.benchmark.answer import read_answers
     from sim.trials.benchmark.judge import judge as judge_answers
     from sim.trials.benchmark.judged_file import write_judged
     from sim.trials.benchmark.table import Judgement
 
-    judged: list[Judged] = []
-    for file in [answers] if isinstance(answers, str | Path) else answers:
-        path = Path(file)
-        complete = _complete(path / _ANSWERS if path.is_dir() else path, partial=partial)
-        judged += judge_answers(complete, _folder(data))
+    files = [Path(file) for file in ([answers] if isinstance(answers, str | Path) else answers)]
+    read = (read_answers(file / _ANSWERS if file.is_dir() else file, complete=not partial) for file in files)
+    judged = [verdict for one in read for verdict in judge_answers(one, _folder(data))]
     if out is not None:
         write_judged(judged, out)
     return Judgement(tuple(judged))
 
 
-@command("benchmark table", results=_of_judgement)
-def table(
-    results: Annotated[
-        str | Path | Sequence[str | Path],
-        Option("Judged answers, as judge --out writes them.", "RESULTS...", kind=list[Path], argument=True, reads=True),
-    ],
-) -> "Judgement":
+@command("benchmark table")
+def table(results: Annotated[str | Path | Sequence[str | Path], _RESULTS]) -> "Judgement":
     """Summarise judged answers of one or several methods, with 95 % intervals: shares, points, calibration.
 
     Writes nothing.
@@ -315,36 +249,5 @@ def table(
     return Judgement(tuple(judged for file in files for judged in read_judged(file)))
 
 
-def _complete(path: Path, *, partial: bool) -> "list[Answer]":
-    """Return the answers of a file, with an error for each world of its sets and splits that it lacks."""
-    from sim.trials.benchmark.answer import Answer, read_answers
-    from sim.trials.benchmark.release import cases, find_case
-
-    found = read_answers(path)
-    given: dict[tuple[str, str], Answer] = {}
-    for answer in found:
-        if (answer.method, answer.world) in given:
-            raise InputError(f"{path}: two answers for {answer.world} by method {answer.method!r}; give one")
-        given[answer.method, answer.world] = answer
-    if partial:
-        return found
-    groups = {(one.method, case.set_name, case.split) for one in found for case in [find_case(one.world)]}
-    return found + [
-        Answer(case.world, "error", method=method, error="no answer")
-        for method, name, split in sorted(groups)
-        for case in cases(name, split)
-        if (method, case.world) not in given
-    ]
-
-
 def _folder(data: str | Path | None) -> str:
     return "" if data is None else str(Path(data).resolve())
-
-
-def _chosen(sets: Sequence[str]) -> list[str]:
-    from sim.trials.benchmark.release import SETS
-
-    for name in sets:
-        if name not in SETS:
-            raise unknown_name("set", name, SETS)
-    return list(dict.fromkeys(sets)) or list(_DRAWN)

@@ -9,7 +9,7 @@ gfimu campaign plan.toml --out campaign
 gfimu campaign status campaign
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -20,20 +20,23 @@ from gfimu.commands.shell.declare import Option, command
 from gfimu.commands.shell.options import BY, WORKERS
 
 if TYPE_CHECKING:
-    from sim.trials.sweep.results import CampaignResult, CampaignStatus, CampaignTable
+    from sim.trials.sweep.results import CampaignPlot, CampaignResult, CampaignStatus, CampaignTable
 
 __all__ = ["campaign", "campaign_plot", "campaign_status", "campaign_table"]
 
 _PICTURE = OutputFile(
     "a picture", (".png", ".svg", ".html"), dict.fromkeys((".png", ".svg", ".html"), ("matplotlib",)), any_case=True
 )
-_FOLDER = Option("Folder of the campaign.", "DIR", kind=Path, argument=True, reads=True)
-
-
-def _results() -> Any:
-    from sim.trials.sweep import results
-
-    return results
+_PLAN = Option("Plan (.toml), or the folder of a campaign, of which nothing is run.", "PLAN", argument=True, reads=True)
+_OUT = Option("Folder to write; one that was begun is continued.", writes=OutputFolder(("plan.toml",)), what="campaign")
+_WORKERS = WORKERS.also("; with --cluster slurm, jobs", least=1)
+_CLUSTER = Option("Dask scheduler instead, such as tcp://host:8786, or slurm.")
+_PROGRESS = Option("Called with the number of cases that are done and of all.", shell=False)
+_FOLDER = Option("Folder of the campaign.", "DIR", argument=True, reads=True)
+_TABLE = OutputFile("a table", (".csv",))
+_CSV = Option("File to write: the quantiles, one row per group.", "FILE", writes=_TABLE, what="quantiles")
+_DRAWING = Option("Picture to write (.png, .svg, .html).", writes=_PICTURE, what="picture")
+_RESULT = Option("Result to draw; may be repeated. The first four by default.", "NAME", kind=list[str])
 
 
 def _exit_code(result: "CampaignResult") -> int:
@@ -45,40 +48,15 @@ def _exit_code(result: "CampaignResult") -> int:
     return 1
 
 
-@command(
-    results=lambda: (_results().CampaignResult,),
-    doing=lambda given: f"campaign {given['plan']}",
-    continues=True,
-    exit_code=_exit_code,
-)
+@command(doing=lambda given: f"campaign {given['plan']}", continues=True, exit_code=_exit_code)
 def campaign(
-    plan: Annotated[
-        str | Path,
-        Option(
-            "Plan (.toml), or the folder of a campaign, of which nothing is run.",
-            "PLAN",
-            kind=Path,
-            argument=True,
-            reads=True,
-        ),
-    ],
+    plan: Annotated[str | Path, _PLAN],
     *,
-    out: Annotated[
-        str | Path | None,
-        Option(
-            "Folder to write; one that was begun is continued.",
-            kind=Path,
-            writes=OutputFolder(("plan.toml",)),
-            what="campaign",
-        ),
-    ] = None,
+    out: Annotated[str | Path | None, _OUT] = None,
     by: Annotated[Sequence[str], BY] = (),
-    workers: Annotated[int | None, WORKERS.also("; with --cluster slurm, jobs", least=1)] = None,
-    cluster: Annotated[str, Option("Dask scheduler instead, such as tcp://host:8786, or slurm.")] = "",
-    progress: Annotated[
-        Callable[[int, int], None] | None,
-        Option("Called with the number of cases that are done and of all.", shell=False),
-    ] = None,
+    workers: Annotated[int | None, _WORKERS] = None,
+    cluster: Annotated[str, _CLUSTER] = "",
+    progress: Annotated[Callable[[int, int], None] | None, _PROGRESS] = None,
 ) -> "CampaignResult":
     """Run the cases of a plan that its folder lacks, and summarise them; or summarise a folder.
 
@@ -109,7 +87,7 @@ def campaign(
     from sim.trials.sweep.engine import run_campaign
     from sim.trials.sweep.executors import check_cluster, open_workers, processors
     from sim.trials.sweep.plan import load_plan
-    from sim.trials.sweep.summary import failures, grouped
+    from sim.trials.sweep.results import CampaignResult
 
     if Path(plan).is_dir():
         if out is not None:
@@ -124,13 +102,10 @@ def campaign(
         opened = partial(open_workers, workers or processors(), cluster)
         dataset = Dataset.create(out, plan)
         run_campaign(dataset, KINDS[loaded.kind], opened, progress=progress)
-    table = dataset.table()
-    groups = tuple(grouped(table, dataset.plan, list(by)))
-    cases = len(Design(dataset.plan))
-    return _results().CampaignResult(dataset.folder, cases, len(table), failures(table), groups, ran=out is not None)
+    return CampaignResult.of(dataset, by, ran=out is not None)
 
 
-@command("campaign status", results=lambda: (_results().CampaignStatus,))
+@command("campaign status")
 def campaign_status(folder: Annotated[str | Path, _FOLDER]) -> "CampaignStatus":
     """Say how far a campaign is, also while another process runs it: cases, rate, time left, failures.
 
@@ -153,32 +128,17 @@ def campaign_status(folder: Annotated[str | Path, _FOLDER]) -> "CampaignStatus":
     >>> gfimu.campaign_status("campaign").done  # doctest: +SKIP
     """
     from sim.trials.sweep.dataset import Dataset
-    from sim.trials.sweep.design import Design
-    from sim.trials.sweep.pace import runs
-    from sim.trials.sweep.summary import failures
+    from sim.trials.sweep.results import CampaignStatus
 
-    dataset = Dataset.open(folder)
-    running = tuple(runs(dataset))
-    table = dataset.table(["failure"])
-    cases = len(Design(dataset.plan))
-    return _results().CampaignStatus(dataset.folder, cases, len(table), failures(table), running)
+    return CampaignStatus.of(Dataset.open(folder))
 
 
-@command("campaign table", results=lambda: (_results().CampaignTable,), doing="reading the campaign")
+@command("campaign table", doing="reading the campaign")
 def campaign_table(
     folder: Annotated[str | Path, _FOLDER],
     *,
     by: Annotated[Sequence[str], BY] = (),
-    csv: Annotated[
-        str | Path | None,
-        Option(
-            "File to write: the quantiles, one row per group.",
-            "FILE",
-            kind=Path,
-            writes=OutputFile("a table", (".csv",)),
-            what="quantiles",
-        ),
-    ] = None,
+    csv: Annotated[str | Path | None, _CSV] = None,
 ) -> "CampaignTable":
     """Print quantiles of each result by the values of factors, and which factors cause its variance.
 
@@ -199,34 +159,26 @@ def campaign_table(
     >>> gfimu.campaign_table("campaign").to_pandas()  # doctest: +SKIP
     """
     from sim.trials.sweep.dataset import Dataset
-    from sim.trials.sweep.design import Design
-    from sim.trials.sweep.sensitivity import seed_shares, sensitivities
-    from sim.trials.sweep.summary import grouped
+    from sim.trials.sweep.results import CampaignTable
 
-    dataset = Dataset.open(folder)
-    table, design = dataset.table(), Design(dataset.plan)
-    groups = tuple(grouped(table, dataset.plan, list(by)))
-    result = _results().CampaignTable(groups, tuple(sensitivities(table, design)), seed_shares(table, design))
+    result = CampaignTable.of(Dataset.open(folder), by)
     if csv is not None:
         result.write_csv(csv)
     return result
 
 
-@command(
-    "campaign plot",
-    results=lambda: (_results().CampaignPlot,),
-    report=lambda drawn, given: _results().CampaignPlot(drawn),
-    doing="drawing",
-)
+def _plot(drawn: list[str], _: Mapping[str, Any]) -> "CampaignPlot":
+    from sim.trials.sweep.results import CampaignPlot
+
+    return CampaignPlot(drawn)
+
+
+@command("campaign plot", report=_plot, doing="drawing")
 def campaign_plot(
     folder: Annotated[str | Path, _FOLDER],
     *,
-    out: Annotated[
-        str | Path, Option("Picture to write (.png, .svg, .html).", kind=Path, writes=_PICTURE, what="picture")
-    ],
-    result: Annotated[
-        Sequence[str], Option("Result to draw; may be repeated. The first four by default.", "NAME", kind=list[str])
-    ] = (),
+    out: Annotated[str | Path, _DRAWING],
+    result: Annotated[Sequence[str], _RESULT] = (),
 ) -> list[str]:
     """Draw results against each factor, and which factors cause their variance; return the names of what is drawn.
 

@@ -30,11 +30,8 @@ __all__ = ["FOLDER", "demo"]
 FOLDER = OutputFolder(("run.parquet", "estimate.parquet", "calibration.json", "run.rrd", "hidden.parquet"))
 """What the folder of the demo holds, beside the folder ``diagnosis``."""
 
-
-def _results() -> tuple[type, ...]:
-    from gfimu.commands.demo_steps import DemoResult
-
-    return (DemoResult,)
+_OUT = Option("Folder to write; made where it is not there.", "DIR", writes=FOLDER)
+_REPORT = Option("Called before each step with its number from 1, how many there are, and what it does.", shell=False)
 
 
 def _run(given: Mapping[str, Any], as_json: bool) -> None:
@@ -57,17 +54,12 @@ def _run(given: Mapping[str, Any], as_json: bool) -> None:
         print_blocks(result.shown())
 
 
-@command(run=_run, results=_results)
+@command(run=_run)
 def demo(
-    out: Annotated[
-        str | Path, Option("Folder to write; made where it is not there.", "DIR", kind=Path, writes=FOLDER)
-    ] = "gfimu-demo",
+    out: Annotated[str | Path, _OUT] = "gfimu-demo",
     *,
-    seed: Annotated[int, SEED.also(least=0)] = 1,
-    report: Annotated[
-        Callable[[int, int, str], None] | None,
-        Option("Called before each step with its number from 1, how many there are, and what it does.", shell=False),
-    ] = None,
+    seed: Annotated[int, SEED] = 1,
+    report: Annotated[Callable[[int, int, str], None] | None, _REPORT] = None,
 ) -> "DemoResult":
     """Run the paper's experiment in simulation: geometry, recording, estimate, drift, picture, diagnosis.
 
@@ -93,5 +85,5 @@ def demo(
     for number, step in enumerate(STEPS, start=1):
         if report is not None:
             report(number, len(STEPS), (step.__doc__ or step.__name__).splitlines()[0].rstrip("."))
-        step(done)
+        done.rows.extend(step(done))
     return DemoResult(seed, tuple(done.rows), done.written)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.base.declared import Declared, Written, figure, table
+from gfimu.base.declared import Declared, Number, Written, figure, table
 from gfimu.base.results import TableResult, text_column
 
 if TYPE_CHECKING:
@@ -27,6 +28,8 @@ _TWIN = "cube12_turntable"
 _DRIFT_SECONDS = 5.0  # the closed forms of the drift still hold then
 _MONTE_CARLO_RUNS = 200
 
+_optional = partial(figure, absent=True)
+
 
 @dataclass(frozen=True)
 class Row(Declared):
@@ -35,44 +38,38 @@ class Row(Declared):
     what: Annotated[str, figure("What was asked.", head="what")]
     result: Annotated[str, figure("The answer with its unit.", head="result", in_json=False)]
     beside: Annotated[str, figure("What to compare it with.", head="to compare", in_json=False)]
-    condition_number: Annotated[float | None, figure("Condition number κ(J) of the array.", absent=True)] = None
-    gdop: Annotated[float | None, figure("GDOP of the array.", absent=True)] = None
+    condition_number: Annotated[Number, _optional("Condition number κ(J) of the array.")] = None
+    gdop: Annotated[Number, _optional("GDOP of the array.")] = None
     omega_squared_leakage: Annotated[
-        float | None, figure("Largest coefficient of a product of ω in the linear solution.", absent=True)
+        Number, _optional("Largest coefficient of a product of ω in the linear solution.")
     ] = None
-    samples: Annotated[int | None, figure("Samples of the recording.", absent=True)] = None
-    peak_rate_rad_s: Annotated[float | None, figure("Fastest rate of the run.", "rad/s", absent=True)] = None
-    largest_bias_m_s2: Annotated[float | None, figure("Largest bias read off at rest.", "m/s²", absent=True)] = None
-    rmse_m_s2: Annotated[float | None, figure("Error of p, rms.", "m/s²", absent=True)] = None
-    noise_std_m_s2: Annotated[float | None, figure("Error that the noise alone gives.", "m/s²", absent=True)] = None
-    rmse_rad_s2: Annotated[float | None, figure("Error of α, rms.", "rad/s²", absent=True)] = None
-    peak_rad_s2: Annotated[float | None, figure("Largest α of the run.", "rad/s²", absent=True)] = None
-    rmse_rad_s: Annotated[float | None, figure("Error of ω, rms.", "rad/s", absent=True)] = None
-    rmse_raw_rad_s: Annotated[
-        float | None, figure("Error of ω without the biases taken off, rms.", "rad/s", absent=True)
-    ] = None
+    samples: Annotated[int | None, _optional("Samples of the recording.")] = None
+    peak_rate_rad_s: Annotated[Number, _optional("Fastest rate of the run.", "rad/s")] = None
+    largest_bias_m_s2: Annotated[Number, _optional("Largest bias read off at rest.", "m/s²")] = None
+    rmse_m_s2: Annotated[Number, _optional("Error of p, rms.", "m/s²")] = None
+    noise_std_m_s2: Annotated[Number, _optional("Error that the noise alone gives.", "m/s²")] = None
+    rmse_rad_s2: Annotated[Number, _optional("Error of α, rms.", "rad/s²")] = None
+    peak_rad_s2: Annotated[Number, _optional("Largest α of the run.", "rad/s²")] = None
+    rmse_rad_s: Annotated[Number, _optional("Error of ω, rms.", "rad/s")] = None
+    rmse_raw_rad_s: Annotated[Number, _optional("Error of ω without the biases taken off, rms.", "rad/s")] = None
     expected_std_at_end_rad_s: Annotated[
-        float | None, figure("Standard deviation of ω that is expected at the end.", "rad/s", absent=True)
+        Number, _optional("Standard deviation of ω that is expected at the end.", "rad/s")
     ] = None
-    error_rad: Annotated[float | None, figure("Error of the angle at the end.", "rad", absent=True)] = None
-    error_m: Annotated[float | None, figure("Error of the position at the end.", "m", absent=True)] = None
-    expected_m: Annotated[float | None, figure("Position error that is expected, 1 σ.", "m", absent=True)] = None
-    valid_until_s: Annotated[float | None, figure("Time until which the closed form holds.", "s", absent=True)] = None
-    alpha_before_deg_s2: Annotated[
-        float | None, figure("Apparent α at rest before the calibration.", "°/s²", absent=True)
-    ] = None
-    alpha_after_deg_s2: Annotated[float | None, figure("Apparent α at rest after it.", "°/s²", absent=True)] = None
-    rmse_before_rad_s: Annotated[
-        float | None, figure("Error of ω before the calibration, rms.", "rad/s", absent=True)
-    ] = None
-    rmse_after_rad_s: Annotated[float | None, figure("Error of ω after it, rms.", "rad/s", absent=True)] = None
-    drift_before_m: Annotated[float | None, figure("Position drift before the calibration.", "m", absent=True)] = None
-    drift_after_m: Annotated[float | None, figure("Position drift after it.", "m", absent=True)] = None
-    hidden: Annotated[float | None, figure("Size of the hidden effect, in its unit.", absent=True)] = None
-    found: Annotated[float | None, figure("Size that the diagnosis finds, in its unit.", absent=True)] = None
-    std: Annotated[float | None, figure("Standard deviation of the size found, in its unit.", absent=True)] = None
-    unit: Annotated[str | None, figure("Unit of these three.", absent=True)] = None
-    verdict: Annotated[str | None, figure("Verdict of the diagnosis.", absent=True)] = None
+    error_rad: Annotated[Number, _optional("Error of the angle at the end.", "rad")] = None
+    error_m: Annotated[Number, _optional("Error of the position at the end.", "m")] = None
+    expected_m: Annotated[Number, _optional("Position error that is expected, 1 σ.", "m")] = None
+    valid_until_s: Annotated[Number, _optional("Time until which the closed form holds.", "s")] = None
+    alpha_before_deg_s2: Annotated[Number, _optional("Apparent α at rest before the calibration.", "°/s²")] = None
+    alpha_after_deg_s2: Annotated[Number, _optional("Apparent α at rest after it.", "°/s²")] = None
+    rmse_before_rad_s: Annotated[Number, _optional("Error of ω before the calibration, rms.", "rad/s")] = None
+    rmse_after_rad_s: Annotated[Number, _optional("Error of ω after it, rms.", "rad/s")] = None
+    drift_before_m: Annotated[Number, _optional("Position drift before the calibration.", "m")] = None
+    drift_after_m: Annotated[Number, _optional("Position drift after it.", "m")] = None
+    hidden: Annotated[Number, _optional("Size of the hidden effect, in its unit.")] = None
+    found: Annotated[Number, _optional("Size that the diagnosis finds, in its unit.")] = None
+    std: Annotated[Number, _optional("Standard deviation of the size found, in its unit.")] = None
+    unit: Annotated[str | None, _optional("Unit of these three.")] = None
+    verdict: Annotated[str | None, _optional("Verdict of the diagnosis.")] = None
 
 
 @dataclass(frozen=True)
@@ -134,117 +131,96 @@ class Demo:
         """Return a vector of the true motion, shape (n, 3)."""
         return np.column_stack([self.recording.extra[f"truth_{quantity}_{axis}_{unit}"] for axis in "xyz"])
 
-    def position_error(self) -> NDArray[np.float64]:
-        """Return the position error of the estimate in the world, m, shape (n, 3): the cube stands on the axis."""
-        if self.estimate.position is None:
+    def position_error(self, estimate: Estimate) -> NDArray[np.float64]:
+        """Return the position error of an estimate in the world, m, shape (n, 3): the cube stands on the axis."""
+        if estimate.position is None:
             raise TypeError("the estimate holds no position")
         true = self.truth("position", "m")
-        return self.estimate.position - (true - true[0])
+        return estimate.position - (true - true[0])
+
+    def file(self, what: str, name: str) -> Path:
+        """Return the path of a file that is written, and note what it is."""
+        self.written[what] = self.out / name
+        return self.written[what]
+
+    @property
+    def early(self) -> int:
+        """First sample after the time until which the closed forms of the drift hold."""
+        t_s = self.recording.t_s
+        return int(np.searchsorted(t_s, t_s[0] + _DRIFT_SECONDS))
 
 
-def score_geometry(demo: Demo) -> None:
+def score_geometry(demo: Demo) -> Iterator[Row]:
     """Score the array."""
     from gfimu.array_search.scoring import score
 
+    del demo
     (cube,) = score("cube12")
-    leakage = float(np.max(np.abs(cube.omega_squared_leakage)))
-    demo.rows.append(
-        Row(
-            "geometry: condition number, GDOP",
-            f"{cube.condition_number:.4f}, {cube.gdop:.4f}",
-            "paper: 1.414, 1.061 (L/2 = 1)",
-            condition_number=cube.condition_number,
-            gdop=cube.gdop,
-            omega_squared_leakage=leakage,
-        )
-    )
+    yield _row(
+        "geometry: condition number, GDOP", "{condition_number:.4f}, {gdop:.4f}", "paper: 1.414, 1.061 (L/2 = 1)",
+        condition_number=cube.condition_number, gdop=cube.gdop,
+        omega_squared_leakage=float(np.max(np.abs(cube.omega_squared_leakage))),
+    )  # fmt: skip
 
 
-def simulate_run(demo: Demo) -> None:
+def simulate_run(demo: Demo) -> Iterator[Row]:
     """Simulate the paper's run in MuJoCo."""
     from sim.scenarios import Scenario
     from sim.simulation import simulate
 
-    path = demo.out / "run.parquet"
     demo.scenario = Scenario.load(_SCENARIO)
-    demo.recording = simulate(demo.scenario, seed=demo.seed, out=path)
-    demo.written["recording"] = path
-    fastest = float(np.abs(demo.truth("omega", "rad_s")).max())
-    largest = max(abs(bias) for bias in demo.recording.metadata["truth_bias_m_s2"].values())
-    demo.rows.append(
-        Row(
-            "simulated run",
-            f"{demo.recording.duration:.0f} s × {len(demo.recording.channels)} channels",
-            f"±{fastest:.0f} rad/s at {demo.recording.sample_rate:.0f} Hz; biases up to {largest:.2f} m/s²",
-            samples=len(demo.recording),
-            peak_rate_rad_s=fastest,
-            largest_bias_m_s2=largest,
-        )
-    )
+    run = demo.recording = simulate(demo.scenario, seed=demo.seed, out=demo.file("recording", "run.parquet"))
+    yield _row(
+        "simulated run", f"{run.duration:.0f} s × {len(run.channels)} channels",
+        f"±{{peak_rate_rad_s:.0f}} rad/s at {run.sample_rate:.0f} Hz; biases up to {{largest_bias_m_s2:.2f}} m/s²",
+        samples=len(run), peak_rate_rad_s=float(np.abs(demo.truth("omega", "rad_s")).max()),
+        largest_bias_m_s2=max(map(abs, run.metadata["truth_bias_m_s2"].values())),
+    )  # fmt: skip
 
 
-def read_biases(demo: Demo) -> None:
+def read_biases(demo: Demo) -> Iterator[Row]:
     """Read the channels' biases off at rest, as the paper does."""
     from gfimu.motion.rest_bias import rest_bias
 
     array = demo.scenario.array
     demo.bias = rest_bias(demo.recording, array, gravity=demo.scenario.gravity)
     true_bias = np.array([demo.recording.metadata["truth_bias_m_s2"][channel] for channel in array.channels])
-    error = float(np.sqrt(np.mean((demo.bias.bias - true_bias) ** 2)))
-    spread = float(np.sqrt(np.mean(demo.bias.std**2)))
-    demo.rows.append(
-        Row(
-            "biases read at rest, rms error",
-            f"{error:.3f} m/s²",
-            f"{spread:.3f} by noise, the rest by gain and axis errors",
-            rmse_m_s2=error,
-            noise_std_m_s2=spread,
-        )
-    )
+    yield _row(
+        "biases read at rest, rms error", "{rmse_m_s2:.3f} m/s²",
+        "{noise_std_m_s2:.3f} by noise, the rest by gain and axis errors",
+        rmse_m_s2=_rms(demo.bias.bias - true_bias), noise_std_m_s2=_rms(demo.bias.std),
+    )  # fmt: skip
 
 
-def estimate_motion(demo: Demo) -> None:
+def estimate_motion(demo: Demo) -> Iterator[Row]:
     """Estimate acceleration, rate and angle."""
     from gfimu.motion.estimation import estimate
     from gfimu.motion.rest_bias import estimate_from_rest
 
-    array = demo.scenario.array
+    array, gravity = demo.scenario.array, demo.scenario.gravity
     raw = estimate(demo.recording, array)
-    path = demo.out / "estimate.parquet"
-    demo.estimate = estimate_from_rest(demo.recording, array, gravity=demo.scenario.gravity, with_position=True)
-    demo.estimate.write(path)
-    demo.written["estimate"] = path
-    alpha = _rms(demo.estimate.alpha[:, 2] - demo.truth("alpha", "rad_s2")[:, 2])
-    omega = demo.estimate.omega[:, 2] - demo.truth("omega", "rad_s")[:, 2]
-    without = _rms(raw.omega[:, 2] - demo.truth("omega", "rad_s")[:, 2])
-    angle = float(demo.estimate.angle[-1] - demo.recording.reference["angle_rad"][-1])
-    peak = float(np.abs(demo.truth("alpha", "rad_s2")[:, 2]).max())
-    demo.rows += [
-        Row(
-            "angular acceleration, rms error",
-            f"{alpha:.3f} rad/s²",
-            f"the table reaches {peak:.1f} rad/s²",
-            rmse_rad_s2=alpha,
-            peak_rad_s2=peak,
-        ),
-        Row(
-            "angular rate, integrated, rms error",
-            f"{_rms(omega):.3f} rad/s",
-            f"{without:.0f} rad/s with biases left in",
-            rmse_rad_s=_rms(omega),
-            rmse_raw_rad_s=without,
-            expected_std_at_end_rad_s=float(demo.estimate.omega_std[-1, 2]),
-        ),
-        Row(
-            "table angle, error at the end",
-            f"{angle:+.2f} rad",
-            f"after {np.abs(np.diff(demo.recording.reference['angle_rad'])).sum() / (2 * np.pi):.0f} revolutions",
-            error_rad=angle,
-        ),
-    ]
+    motion = demo.estimate = estimate_from_rest(demo.recording, array, gravity=gravity, with_position=True)
+    motion.write(demo.file("estimate", "estimate.parquet"))
+    true_alpha, true_omega = demo.truth("alpha", "rad_s2")[:, 2], demo.truth("omega", "rad_s")[:, 2]
+    true_angle = demo.recording.reference["angle_rad"]
+    yield _row(
+        "angular acceleration, rms error", "{rmse_rad_s2:.3f} rad/s²", "the table reaches {peak_rad_s2:.1f} rad/s²",
+        rmse_rad_s2=_rms(motion.alpha[:, 2] - true_alpha), peak_rad_s2=float(np.abs(true_alpha).max()),
+    )  # fmt: skip
+    yield _row(
+        "angular rate, integrated, rms error", "{rmse_rad_s:.3f} rad/s",
+        "{rmse_raw_rad_s:.0f} rad/s with biases left in",
+        rmse_rad_s=_rms(motion.omega[:, 2] - true_omega), rmse_raw_rad_s=_rms(raw.omega[:, 2] - true_omega),
+        expected_std_at_end_rad_s=float(motion.omega_std[-1, 2]),
+    )  # fmt: skip
+    turns = np.abs(np.diff(true_angle)).sum() / (2 * np.pi)
+    error = float(motion.angle[-1] - true_angle[-1])
+    yield _row(
+        "table angle, error at the end", "{error_rad:+.2f} rad", f"after {turns:.0f} revolutions", error_rad=error
+    )
 
 
-def state_drift(demo: Demo) -> None:
+def state_drift(demo: Demo) -> Iterator[Row]:
     """State the position drift that was to be expected."""
     from gfimu.array.parts.part import white_noise_std
     from gfimu.budget.drift import ErrorSources, drift_budget
@@ -254,117 +230,83 @@ def state_drift(demo: Demo) -> None:
     noise = _rms(white_noise_std(array, recording.sample_rate))
     sources = ErrorSources(bias=_rms(demo.bias.std), noise_density=noise / np.sqrt(recording.sample_rate / 2))
     budget = drift_budget(array, _DRIFT_SECONDS, sources, gravity=demo.scenario.gravity)
-    duration = recording.duration
-    demo.drift = monte_carlo_drift(
-        array, duration, sources, runs=_MONTE_CARLO_RUNS, rng=np.random.default_rng(demo.seed)
-    )
-    error = demo.position_error()
-    early = int(np.searchsorted(recording.t_s, recording.t_s[0] + _DRIFT_SECONDS))
-    closed = float(np.hypot(*budget.total_std[:2]))
-    final = float(np.hypot(*demo.drift.std[-1, :2]))
-    demo.rows += [
-        Row(
-            f"position drift after {_DRIFT_SECONDS:.0f} s",
-            f"{np.hypot(*error[early, :2]):.1f} m",
-            f"expected {closed:.1f} m; formula holds to {budget.valid_until:.1f} s",
-            error_m=float(np.hypot(*error[early, :2])),
-            expected_m=closed,
-            valid_until_s=budget.valid_until,
-        ),
-        Row(
-            f"position drift after {duration:.0f} s",
-            f"{np.hypot(*error[-1, :2]):.0f} m",
-            f"expected {final:.0f} m by Monte Carlo",
-            error_m=float(np.hypot(*error[-1, :2])),
-            expected_m=final,
-        ),
-    ]
+    rng = np.random.default_rng(demo.seed)
+    demo.drift = monte_carlo_drift(array, recording.duration, sources, runs=_MONTE_CARLO_RUNS, rng=rng)
+    error = demo.position_error(demo.estimate)
+    yield _row(
+        f"position drift after {_DRIFT_SECONDS:.0f} s", "{error_m:.1f} m",
+        "expected {expected_m:.1f} m; formula holds to {valid_until_s:.1f} s",
+        error_m=_horizontal(error[demo.early]), expected_m=_horizontal(budget.total_std),
+        valid_until_s=budget.valid_until,
+    )  # fmt: skip
+    yield _row(
+        f"position drift after {recording.duration:.0f} s", "{error_m:.0f} m",
+        "expected {expected_m:.0f} m by Monte Carlo",
+        error_m=_horizontal(error[-1]), expected_m=_horizontal(demo.drift.std[-1]),
+    )  # fmt: skip
 
 
-def calibrate_chips(demo: Demo) -> None:
+def calibrate_chips(demo: Demo) -> Iterator[Row]:
     """Calibrate the same chips from static poses and compare the drift."""
-    from dataclasses import replace
-
     from gfimu.calibration.array_calibration import calibrate_array
     from gfimu.motion.estimation import estimate
     from sim.motions.pose_sequence import PoseSequence
     from sim.simulation import simulate
 
-    array, gravity = demo.scenario.array, demo.scenario.gravity
-    sequence = PoseSequence()
+    array, sequence = demo.scenario.array, PoseSequence()
     # The same seed draws the same chips.
     poses = simulate(replace(demo.scenario, motion=sequence, duration=sequence.duration), seed=demo.seed)
-    calibration = calibrate_array(poses, array, gravity=gravity)
-    path = demo.out / "calibration.json"
-    calibration.save(path)
-    demo.written["calibration"] = path
-    early = int(np.searchsorted(demo.recording.t_s, demo.recording.t_s[0] + _DRIFT_SECONDS))
+    calibration = calibrate_array(poses, array, gravity=demo.scenario.gravity)
+    calibration.save(demo.file("calibration", "calibration.json"))
     still = demo.recording.t_s < demo.bias.stop_s
-    true_position, true_omega = demo.truth("position", "m"), demo.truth("omega", "rad_s")
-    alpha, omega, drift = [], [], []
-    for recording in (demo.recording, calibration.apply(demo.recording)):
+
+    def errors(recording: Recording) -> tuple[float, float, float]:
         found = estimate(recording, array, with_position=True)
-        if found.position is None:
-            raise TypeError("the estimate holds no position")
-        alpha.append(float(np.rad2deg(np.linalg.norm(np.nanmean(found.alpha[still], axis=0)))))
-        omega.append(_rms(np.linalg.norm(found.omega - true_omega, axis=1)))
-        drift.append(float(np.hypot(*(found.position - (true_position - true_position[0]))[early, :2])))
-    demo.rows += [
-        Row(
-            f"calibrated from {calibration.statistics['poses']:.0f} poses: α seen at rest",
-            f"{alpha[1]:.1f} °/s²",
-            f"{alpha[0]:.0f} °/s² before",
-            alpha_before_deg_s2=alpha[0],
-            alpha_after_deg_s2=alpha[1],
-        ),
-        Row(
-            "calibrated: angular rate, rms error",
-            f"{omega[1]:.2f} rad/s",
-            f"{omega[0]:.0f} rad/s before; no bias read at rest in either",
-            rmse_before_rad_s=omega[0],
-            rmse_after_rad_s=omega[1],
-        ),
-        Row(
-            f"calibrated: position drift after {_DRIFT_SECONDS:.0f} s",
-            f"{drift[1]:.1f} m",
-            f"{drift[0]:.0f} m before",
-            drift_before_m=drift[0],
-            drift_after_m=drift[1],
-        ),
-    ]
+        alpha = np.linalg.norm(np.nanmean(found.alpha[still], axis=0))
+        omega = np.linalg.norm(found.omega - demo.truth("omega", "rad_s"), axis=1)
+        return float(np.rad2deg(alpha)), _rms(omega), _horizontal(demo.position_error(found)[demo.early])
+
+    (alpha_before, omega_before, drift_before), (alpha, omega, drift) = map(
+        errors, (demo.recording, calibration.apply(demo.recording))
+    )
+    yield _row(
+        f"calibrated from {calibration.statistics['poses']:.0f} poses: α seen at rest", "{alpha_after_deg_s2:.1f} °/s²",
+        "{alpha_before_deg_s2:.0f} °/s² before", alpha_before_deg_s2=alpha_before, alpha_after_deg_s2=alpha,
+    )  # fmt: skip
+    yield _row(
+        "calibrated: angular rate, rms error", "{rmse_after_rad_s:.2f} rad/s",
+        "{rmse_before_rad_s:.0f} rad/s before; no bias read at rest in either",
+        rmse_before_rad_s=omega_before, rmse_after_rad_s=omega,
+    )  # fmt: skip
+    yield _row(
+        f"calibrated: position drift after {_DRIFT_SECONDS:.0f} s", "{drift_after_m:.1f} m",
+        "{drift_before_m:.0f} m before", drift_before_m=drift_before, drift_after_m=drift,
+    )  # fmt: skip
 
 
-def draw_run(demo: Demo) -> None:
+def draw_run(demo: Demo) -> Iterator[Row]:
     """Write the rerun recording."""
     from gfimu.visual import ExpectedDrift, write_run
     from sim.drawing import rig_drawing
     from sim.truth import known_motion
 
-    path = demo.out / "run.rrd"
     t = demo.recording.t_s
     spread = np.sqrt(np.mean(demo.drift.std[:, :2] ** 2, axis=1))
-    expected = np.interp(t - t[0], demo.drift.t_s, spread)
-    table = "\n".join(f"| {row.what} | {row.result} | {row.beside} |" for row in demo.rows)
+    drift = ExpectedDrift(t, demo.position_error(demo.estimate), np.interp(t - t[0], demo.drift.t_s, spread))
+    lines = "\n".join(f"| {row.what} | {row.result} | {row.beside} |" for row in demo.rows)
     write_run(
-        path,
-        demo.recording,
-        demo.scenario.array,
-        estimate=demo.estimate,
-        known=known_motion(demo.recording),
-        drift=ExpectedDrift(t, demo.position_error(), expected),
-        shapes=rig_drawing(demo.scenario.world),
-        notes=f"| | | |\n|---|---|---|\n{table}",
-        title="the paper's run",
-    )
-    demo.written["rerun recording"] = path
+        demo.file("rerun recording", "run.rrd"), demo.recording, demo.scenario.array, estimate=demo.estimate,
+        known=known_motion(demo.recording), drift=drift, shapes=rig_drawing(demo.scenario.world),
+        notes=f"| | | |\n|---|---|---|\n{lines}", title="the paper's run",
+    )  # fmt: skip
+    yield from ()
 
 
-def diagnose_hidden(demo: Demo) -> None:
+def diagnose_hidden(demo: Demo) -> Iterator[Row]:
     """Hide a tilted table and an eccentric cube in the world, and diagnose the recording."""
     from gfimu.commands.diagnose import write_report
     from gfimu.diagnosis.diagnose import diagnose
     from sim.effects import make_effect
-    from sim.scenarios import Scenario
     from sim.simulation import simulate
     from sim.twin import Twin
 
@@ -375,54 +317,44 @@ def diagnose_hidden(demo: Demo) -> None:
         "table_tilt": {"x_rad": lean * np.cos(towards), "y_rad": lean * np.sin(towards)},
         "eccentricity": {"x_m": offset * np.cos(beside), "y_m": offset * np.sin(beside)},
     }
-    scenario = Scenario.load(_SCENARIO)
-    calibrated = replace(
-        scenario,
-        sensor=replace(scenario.sensor, errors=False),
-        effects=tuple(make_effect(name, parameters) for name, parameters in hidden.items()),
-    )
+    effects = tuple(make_effect(name, parameters) for name, parameters in hidden.items())
+    calibrated = replace(demo.scenario, sensor=replace(demo.scenario.sensor, errors=False), effects=effects)
     recording = simulate(calibrated, seed=demo.seed, out=demo.out / "hidden.parquet")
     twin = Twin.load(_TWIN)  # assumes a level table with the cube on its axis
     found = diagnose([recording], twin, names=["hidden.parquet"])
     demo.written["diagnosis report"] = write_report(found, demo.out / "diagnosis")
     causes = {cause.effect: cause for cause in found.causes}
+    verdict = f"{found.verdict.replace('_', ' ')}, {', '.join(causes)}"
     for name, unit, factor, what in (
         ("table_tilt", "°", 180 / np.pi, "hidden tilt of the table, found"),
         ("eccentricity", "mm", 1e3, "hidden offset of the cube, found"),
     ):
         true = factor * float(np.hypot(*hidden[name].values()))
-        cause = causes.get(name)
-        if cause is None:
-            demo.rows.append(Row(what, "not found", f"hidden {true:.3f} {unit}", hidden=true, found=None))
+        if name not in causes:
+            yield _row(what, "not found", f"hidden {{hidden:.3f}} {unit}", hidden=true)
             continue
-        size = factor * float(np.hypot(*cause.parameters.values()))
-        std = factor * float(max(cause.std.values()))
-        demo.rows.append(
-            Row(
-                what,
-                f"{size:.3f} ± {std:.3f} {unit}",
-                f"hidden {true:.3f} {unit}; verdict: {found.verdict.replace('_', ' ')}, {', '.join(causes)}",
-                hidden=true,
-                found=size,
-                std=std,
-                unit=unit,
-                verdict=found.verdict,
-            )
-        )
+        yield _row(
+            what, "{found:.3f} ± {std:.3f} {unit}", f"hidden {{hidden:.3f}} {{unit}}; verdict: {verdict}",
+            hidden=true, found=factor * float(np.hypot(*causes[name].parameters.values())),
+            std=factor * float(max(causes[name].std.values())), unit=unit, verdict=found.verdict,
+        )  # fmt: skip
 
 
-STEPS: tuple[Callable[[Demo], None], ...] = (
-    score_geometry,
-    simulate_run,
-    read_biases,
-    estimate_motion,
-    state_drift,
-    calibrate_chips,
-    draw_run,
-    diagnose_hidden,
+STEPS: tuple[Callable[[Demo], Iterator[Row]], ...] = (
+    *(score_geometry, simulate_run, read_biases, estimate_motion, state_drift),
+    *(calibrate_chips, draw_run, diagnose_hidden),
 )
 """The steps in their order; the first line of each docstring is what the command shows while it runs."""
 
 
+def _row(what: str, result: str, beside: str, **figures: Any) -> Row:
+    """Return a line of the table, whose texts name its figures."""
+    return Row(what, result.format(**figures), beside.format(**figures), **figures)
+
+
 def _rms(values: NDArray[np.float64]) -> float:
     return float(np.sqrt(np.nanmean(values**2)))
+
+
+def _horizontal(vector: NDArray[np.float64]) -> float:
+    return float(np.hypot(*vector[:2]))

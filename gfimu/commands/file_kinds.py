@@ -6,7 +6,7 @@ import importlib
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from gfimu.base.errors import InputError, unknown_name
+from gfimu.base.errors import InputError, check_name
 
 if TYPE_CHECKING:
     import msgspec
@@ -29,8 +29,7 @@ FILE_KINDS = {
 
 def file_schema(kind: str) -> type[msgspec.Struct]:
     """Return the struct of a kind of file; raises `InputError` for an unknown kind."""
-    if kind not in FILE_KINDS:
-        raise unknown_name("kind", kind, FILE_KINDS)
+    check_name("kind", kind, FILE_KINDS)
     module, _, name = FILE_KINDS[kind].rpartition(".")
     found: type[msgspec.Struct] = getattr(importlib.import_module(module), name)
     return found

@@ -10,29 +10,38 @@ gfimu firmware run --help
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, overload
+from typing import TYPE_CHECKING, Annotated, Any, TypedDict, Unpack, overload
 
 from gfimu.base.errors import InputError
 from gfimu.base.files.outputs import RECORDING, OutputFolder
 from gfimu.base.optional_packages import require
 from gfimu.commands.shell.declare import Group, Option, command
-from gfimu.commands.shell.options import BAUD, CHIPS, DURATION, IMAGE, PORT, RANGE, RATE, SCENARIO, SEED, TIME_LIMIT
+from gfimu.commands.shell.options import (
+    BAUD,
+    CHIPS,
+    DURATION,
+    IMAGE,
+    PORT,
+    RANGE,
+    RATE,
+    SCENARIO,
+    SEED,
+    SHARE,
+    TIME_LIMIT,
+)
 from gfimu.commands.shell.output_files import TRACE
 
 if TYPE_CHECKING:
     from firmware_bridge.board.trace import TraceCounts
-    from firmware_bridge.loop.board_process import BoardProcess
     from firmware_bridge.loop.fault_campaign import FaultReport
     from firmware_bridge.loop.selftest import SelfTestReport
     from firmware_bridge.loop.virtual_port import ServeReport
     from firmware_bridge.loop.virtual_run import VirtualRun
     from firmware_bridge.lpc1768.build import BuildReport
     from firmware_bridge.strict.check import CheckReport
-    from sim.ride import Ride
 
 __all__ = ["build", "check", "faults", "run", "selftest", "trace"]
 
-_BOOT_S = 0.02
 _EITHER = "give either --port (pty or tcp:PORT) or --out (a recording)"
 
 IMAGES = OutputFolder(("gfimu.elf", "gfimu.bin", "gfimu.toml", "selfcheck.elf", "selfcheck.bin", "selfcheck.toml"))
@@ -41,13 +50,21 @@ IMAGES = OutputFolder(("gfimu.elf", "gfimu.bin", "gfimu.toml", "selfcheck.elf", 
 _RIDDEN = SCENARIO.also(", whose motion the board rides")
 _ASKED_RATE = RATE.also(", asked of the firmware, 10 to 3200")
 _NAMED_IMAGE = IMAGE.also(argument=True, metavar="[IMAGE]")
-
-
-def _of_run() -> tuple[type, ...]:
-    from firmware_bridge.loop.virtual_port import ServeReport
-    from firmware_bridge.loop.virtual_run import VirtualRun
-
-    return VirtualRun, ServeReport
+_VIRTUAL = DURATION.also(", of virtual time", least=0.0)
+_PORT = PORT.also(" to open: pty, or tcp:PORT (0: any free one)")
+_OUT = Option("Without a port: recording to write (.csv, .parquet).", "FILE", writes=RECORDING, what="recording")
+_RUN_TIME = _VIRTUAL.also("; else the scenario's, with a port without end")
+_ASKED_RANGE = RANGE.also(", asked of the firmware", name="--range")
+_REALTIME = Option("With a port: keep pace with the clock on the wall.", name="--realtime/--no-realtime")
+_PURE_PYTHON = Option("Run all peripherals in Python: slower, the same result.")
+_SHARE = Option("Without a port: called with the share done, 0 to 1.", shell=False)
+_ON_OPEN = Option("With a port: called with its name when the board answers there.", shell=False)
+_FOLDER = Option("Folder to write: the image; else the package's own folder.", "FOLDER", writes=IMAGES)
+_ON_BOARD = Option("Name of the array on the board, which the board then states to the host.", "NAME", reads=True)
+_TRACE = Option("Trace to write (.vcd for GTKWave, .rrd for rerun).", "FILE", writes=TRACE, what="trace")
+_SKIP = Option("Virtual time before the trace, s.", "S", least=0.0)
+_ATTACHED = CHIPS.also(": ADXL345s on SSP1, 0 to 4; their chip-selects are P2.0 and so on")
+_LINE_SPEED = BAUD.also(", that the UARTs are meant to send at; else any usual one")
 
 
 def _run_on_shell(given: Mapping[str, Any], as_json: bool) -> None:
@@ -65,80 +82,51 @@ def _run_on_shell(given: Mapping[str, Any], as_json: bool) -> None:
     print_report(run.__command__, {**given, "on_open": opened}, as_json=as_json)  # type: ignore[attr-defined]
 
 
+class _Asked(TypedDict, total=False):
+    """What can be asked of a run on a port or without one."""
+
+    scenario: str | Path
+    duration: float | None
+    rate: int
+    range_g: int
+    seed: int
+    image: str | Path
+    pure_python: bool
+
+
 @overload
 def run(
     *,
-    scenario: str | Path = ...,
     port: None = ...,
     out: str | Path | None = ...,
-    duration: float | None = ...,
-    rate: int = ...,
-    range_g: int = ...,
-    seed: int = ...,
-    image: str | Path = ...,
-    pure_python: bool = ...,
     progress: Callable[[float], None] | None = ...,
+    **asked: Unpack[_Asked],
 ) -> "VirtualRun": ...
 
 
 @overload
 def run(
-    *,
-    scenario: str | Path = ...,
-    port: str,
-    duration: float | None = ...,
-    rate: int = ...,
-    range_g: int = ...,
-    realtime: bool = ...,
-    seed: int = ...,
-    image: str | Path = ...,
-    pure_python: bool = ...,
-    on_open: Callable[[str], None] | None = ...,
+    *, port: str, realtime: bool = ..., on_open: Callable[[str], None] | None = ..., **asked: Unpack[_Asked]
 ) -> "ServeReport": ...
 
 
 @command(
-    "firmware run",
-    results=_of_run,
-    run=_run_on_shell,
-    doing=lambda given: f"running {given['image']}" if given["port"] is None else "",
+    "firmware run", run=_run_on_shell, doing=lambda given: f"running {given['image']}" if given["port"] is None else ""
 )
 def run(
     *,
     scenario: Annotated[str | Path, _RIDDEN] = "paper_run",
-    port: Annotated[
-        str | None,
-        PORT.also(" to open: pty, or tcp:PORT (0: any free one)"),
-    ] = None,
-    out: Annotated[
-        str | Path | None,
-        Option(
-            "Without a port: recording to write (.csv, .parquet).",
-            "FILE",
-            kind=Path,
-            writes=RECORDING,
-            what="recording",
-        ),
-    ] = None,
-    duration: Annotated[
-        float | None, DURATION.also(", of virtual time; else the scenario's, with a port without end", least=0.0)
-    ] = None,
+    port: Annotated[str | None, _PORT] = None,
+    out: Annotated[str | Path | None, _OUT] = None,
+    duration: Annotated[float | None, _RUN_TIME] = None,
     rate: Annotated[int, _ASKED_RATE] = 100,
-    range_g: Annotated[int, RANGE.also(", asked of the firmware", name="--range")] = 16,
-    realtime: Annotated[
-        bool, Option("With a port: keep pace with the clock on the wall.", name="--realtime/--no-realtime")
-    ] = True,
+    range_g: Annotated[int, _ASKED_RANGE] = 16,
+    realtime: Annotated[bool, _REALTIME] = True,
     seed: Annotated[int, SEED] = 0,
     image: Annotated[str | Path, IMAGE] = "gfimu",
-    pure_python: Annotated[bool, Option("Run all peripherals in Python: slower, the same result.")] = False,
-    progress: Annotated[
-        Callable[[float], None] | None,
-        Option("Without a port: called with the share done, 0 to 1.", shell=False),
-    ] = None,
-    on_open: Annotated[
-        Callable[[str], None] | None,
-        Option("With a port: called with its name when the board answers there.", shell=False),
-    ] = None,
+    pure_python: Annotated[bool, _PURE_PYTHON] = False,
+    progress: Annotated[Callable[[float], None] | None, _SHARE] = None,
+    on_open: Annotated[Callable[[str], None] | None, _ON_OPEN] = None,
 ) -> "VirtualRun | ServeReport":
     """Run the firmware on an emulated board that rides a scenario: behind a port, or straight into a recording.
 
@@ -159,48 +147,20 @@ def run(
     require("gfimu firmware run", "unicorn", "mujoco")
     if port is not None and out is not None:
         raise InputError(_EITHER)
-    ride = _ride(scenario, seed)
-    if port is not None:
-        return _behind_port(ride, port, duration, (rate, range_g), seed, image, realtime, pure_python, on_open)
+    from firmware_bridge.loop.ridden_board import RiddenBoard
     from firmware_bridge.loop.virtual_run import record_virtual
 
+    ridden = RiddenBoard.of(scenario, seed=seed, image=image, pure_python=pure_python)
+    if port is not None:
+        return ridden.serve(port, duration, rate_hz=rate, range_g=range_g, realtime=realtime, on_open=on_open)
     result = record_virtual(
-        ride, duration or ride.duration, rate_hz=rate, range_g=range_g, image=image,
-        fast=False if pure_python else None, progress=progress,
+        ridden.ride, duration or ridden.ride.duration, rate_hz=rate, range_g=range_g, image=image,
+        fast=ridden.fast, progress=progress,
     )  # fmt: skip
     if out is None:
         return result
     result.recording.write(out)
     return replace(result, files={"recording": Path(out)})
-
-
-def _behind_port(
-    ride: "Ride", port: str, duration: float | None, setup: tuple[int, int], seed: int, image: str | Path,
-    realtime: bool, pure_python: bool, on_open: Callable[[str], None] | None,
-) -> "ServeReport":  # fmt: skip
-    """Serve the board on a port until the time is up or Ctrl-C."""
-    from firmware_bridge.frames.commands import sample_at, set_range
-    from firmware_bridge.loop.virtual_port import open_port, serve
-
-    rate, range_g = setup
-    commands = set_range(range_g) + sample_at(rate)
-    line = open_port(port)
-    try:
-        with _board(ride, image, seed, pure_python=pure_python) as board:
-            board.run_for(_BOOT_S)
-            board.receive(commands)
-            if on_open is not None:
-                on_open(line.name)
-            report = serve(board, line, duration_s=duration, realtime=realtime)
-            return replace(report, warnings=tuple(board.warnings()))
-    finally:
-        line.close()
-
-
-def _of_build() -> tuple[type, ...]:
-    from firmware_bridge.lpc1768.build import BuildReport
-
-    return (BuildReport,)
 
 
 def _definitions(
@@ -216,22 +176,12 @@ def _definitions(
     return defines
 
 
-@command(
-    "firmware build",
-    results=_of_build,
-    doing="compiling",
-    files=lambda report, _: {"ELF file": report.elf, "image": report.binary},
-)
+@command("firmware build", doing="compiling", files=lambda report, _: {"ELF file": report.elf, "image": report.binary})
 def build(
     image: Annotated[str, replace(_NAMED_IMAGE, text="Image: gfimu or selfcheck.")] = "gfimu",
     *,
-    out: Annotated[
-        str | Path | None,
-        Option("Folder to write: the image; else the package's own folder.", "FOLDER", kind=Path, writes=IMAGES),
-    ] = None,
-    array: Annotated[
-        str, Option("Name of the array on the board, which the board then states to the host.", "NAME", reads=True)
-    ] = "",
+    out: Annotated[str | Path | None, _FOLDER] = None,
+    array: Annotated[str, _ON_BOARD] = "",
     baud: Annotated[int | None, BAUD.also(", after power-on; else 115200")] = None,
     define: Annotated[Mapping[str, str] | None, Group(_definitions, "Preprocessor definitions.")] = None,
 ) -> "BuildReport":
@@ -256,17 +206,8 @@ def build(
     return build_image(image, out, array=array, defines={**speed, **(define or {})})
 
 
-def _of_selftest() -> tuple[type, ...]:
-    from firmware_bridge.loop.selftest import SelfTestReport
-
-    return (SelfTestReport,)
-
-
 @command(
-    "firmware selftest",
-    results=_of_selftest,
-    doing="testing the emulator and the firmware",
-    exit_code=lambda report: int(not report.passed),
+    "firmware selftest", doing="testing the emulator and the firmware", exit_code=lambda report: int(not report.passed)
 )
 def selftest() -> "SelfTestReport":
     """Check the emulator and the firmware: interrupts, the chips' self-test, the image, both ways of running.
@@ -284,22 +225,13 @@ def selftest() -> "SelfTestReport":
     return run_selftest()
 
 
-def _of_trace() -> tuple[type, ...]:
-    from firmware_bridge.board.trace import TraceCounts
-
-    return (TraceCounts,)
-
-
-@command("firmware trace", results=_of_trace, doing=lambda given: f"tracing {given['image']}")
+@command("firmware trace", doing=lambda given: f"tracing {given['image']}")
 def trace(
-    out: Annotated[
-        str | Path,
-        Option("Trace to write (.vcd for GTKWave, .rrd for rerun).", "FILE", kind=Path, writes=TRACE, what="trace"),
-    ],
+    out: Annotated[str | Path, _TRACE],
     *,
     scenario: Annotated[str | Path, _RIDDEN] = "rest",
-    duration: Annotated[float, DURATION.also(", of virtual time", least=0.0)] = 0.05,
-    skip: Annotated[float, Option("Virtual time before the trace, s.", "S", least=0.0)] = 0.0,
+    duration: Annotated[float, _VIRTUAL] = 0.05,
+    skip: Annotated[float, _SKIP] = 0.0,
     rate: Annotated[int, _ASKED_RATE] = 800,
     seed: Annotated[int, SEED] = 0,
     image: Annotated[str | Path, IMAGE] = "gfimu",
@@ -318,38 +250,16 @@ def trace(
     gfimu firmware trace --out trace.rrd --skip 0.5
     """
     require("gfimu firmware trace", "unicorn", "mujoco")
-    from firmware_bridge.board.trace import TraceCounts, write_rrd, write_vcd
-    from firmware_bridge.frames.commands import sample_at
+    from firmware_bridge.board.trace import write_trace
+    from firmware_bridge.loop.ridden_board import RiddenBoard
 
-    setup = sample_at(rate)
-    with _board(_ride(scenario, seed), image, seed, pure_python=True, trace=True) as board:
-        if skip:
-            board.run_for(min(skip, _BOOT_S))
-            board.receive(setup)
-            board.run_for(max(0.0, skip - _BOOT_S))
-            board.take_trace()
-        board.run_for(duration)
-        events = board.take_trace()
-    path = Path(out)
-    (write_vcd if path.suffix == ".vcd" else write_rrd)(path, events)
-    return TraceCounts(
-        len(events), sum(event.source != "cpu" for event in events), sum(event.kind == "enter" for event in events)
-    )
+    ridden = RiddenBoard.of(scenario, seed=seed, image=image, pure_python=True)
+    return write_trace(out, ridden.traced(duration, skip_s=skip, rate_hz=rate))
 
 
-def _of_faults() -> tuple[type, ...]:
-    from firmware_bridge.loop.fault_campaign import FaultReport
-
-    return (FaultReport,)
-
-
-@command("firmware faults", results=_of_faults, doing="faults", exit_code=lambda report: int(not report.passed))
+@command("firmware faults", doing="faults", exit_code=lambda report: int(not report.passed))
 def faults(
-    *,
-    seed: Annotated[int, SEED] = 0,
-    progress: Annotated[
-        Callable[[float], None] | None, Option("Called with the share done, 0 to 1.", shell=False)
-    ] = None,
+    *, seed: Annotated[int, SEED] = 0, progress: Annotated[Callable[[float], None] | None, SHARE] = None
 ) -> "FaultReport":
     """Break the wire, the supply and the chips, one after another, and show what the host makes of it.
 
@@ -366,24 +276,15 @@ def faults(
     return run_campaign(seed=seed, progress=progress)
 
 
-def _of_check() -> tuple[type, ...]:
-    from firmware_bridge.strict.check import CheckReport
-
-    return (CheckReport,)
-
-
 @command(
-    "firmware check",
-    results=_of_check,
-    doing=lambda given: f"running {given['image']}",
-    exit_code=lambda report: int(report.faults > 0),
+    "firmware check", doing=lambda given: f"running {given['image']}", exit_code=lambda report: int(report.faults > 0)
 )
 def check(
     image: Annotated[str | Path, _NAMED_IMAGE] = "gfimu",
     *,
-    duration: Annotated[float, DURATION.also(", of virtual time", least=0.0)] = 3.0,
-    chips: Annotated[int, CHIPS.also(": ADXL345s on SSP1, 0 to 4; their chip-selects are P2.0 and so on")] = 4,
-    baud: Annotated[int | None, BAUD.also(", that the UARTs are meant to send at; else any usual one")] = None,
+    duration: Annotated[float, _VIRTUAL] = 3.0,
+    chips: Annotated[int, _ATTACHED] = 4,
+    baud: Annotated[int | None, _LINE_SPEED] = None,
     time_limit: Annotated[float, TIME_LIMIT.also(least=0.0)] = 60.0,
 ) -> "CheckReport":
     """Run an image on a board that reports what a real LPC1768 would not forgive.
@@ -404,20 +305,3 @@ def check(
     from firmware_bridge.strict.check import CheckOptions, check_image
 
     return check_image(image, CheckOptions(duration, chips, baud, time_limit))
-
-
-def _ride(scenario: str | Path, seed: int) -> "Ride":
-    from sim.ride import Ride
-
-    return Ride(scenario, seed=seed)
-
-
-def _board(ride: "Ride", image: str | Path, seed: int, *, pure_python: bool, trace: bool = False) -> "BoardProcess":
-    from firmware_bridge.loop.board_process import BoardProcess
-    from firmware_bridge.loop.physics import RidePhysics
-    from firmware_bridge.loop.virtual_run import typical_chips
-    from gfimu.base.files.model_files import list_models
-
-    fast = False if pure_python else None
-    name = ride.array.name if ride.array.name in list_models("arrays") else ""  # a host knows no other by its name
-    return BoardProcess(RidePhysics(ride), image=image, chips=typical_chips(seed), fast=fast, trace=trace, array=name)

@@ -13,24 +13,14 @@ ssh pi cat /data/run.csv | gfimu live --array cube12 --rate 100
 gfimu live --from socket://pi:4000 --array wheel.toml --axis z --hub free --unknown-start
 """
 
-import sys
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from gfimu.base.errors import InputError, system_errors
+from gfimu.base.errors import InputError
 from gfimu.commands.known_axis import AXIS_ALONE, AxisLike, as_known_axis
 from gfimu.commands.shell.declare import Option, command
-from gfimu.commands.shell.options import (
-    ARRAY,
-    BIAS_STD_M_S2,
-    FORCE,
-    GYRO,
-    KEEP_FAULTY,
-    MAX_MEMORY,
-    RATE,
-    UNKNOWN_START,
-)
+from gfimu.commands.shell.options import ARRAY, BIAS_STD_M_S2, FORCE, GYRO, KEEP_FAULTY, MAX_MEMORY, RATE, UNKNOWN_START
 
 if TYPE_CHECKING:
     from gfimu.array.array import AccelerometerArray
@@ -39,8 +29,12 @@ if TYPE_CHECKING:
 __all__ = ["live"]
 
 _RATES = 1e-3, 1e6  # Hz
-_START_S = 3.0  # of a stream, which are examined
-_FEWEST, _MOST = 50, 5000  # samples of that start
+_FROM = Option(
+    "Where samples come from: - (standard input), a recording, or host:port of a TCP server.", name="--from", kind=str,
+    reads=True,
+)  # fmt: skip
+_FOLLOW = Option("With a recording: go on reading while gfimu record writes it.")
+_SCALE_STD = Option("Uncertainty of the scale factors, a ratio (0.01 is 1 %).")
 
 
 def _results() -> tuple[type, ...]:
@@ -64,17 +58,9 @@ def live(
     array: Annotated["AccelerometerArray | str | Path | None", ARRAY.also("; else the stream's own")] = None,
     rate: Annotated[float | None, RATE.also(", nominal; else the stream's own")] = None,
     *,
-    source: Annotated[
-        "str | Path | Iterable[str]",
-        Option(
-            "Where samples come from: - (standard input), a recording, or host:port of a TCP server.",
-            name="--from",
-            kind=str,
-            reads=True,
-        ),
-    ] = "-",
-    follow: Annotated[bool, Option("With a recording: go on reading while gfimu record writes it.")] = False,
-    scale_std: Annotated[float, Option("Uncertainty of the scale factors, a ratio (0.01 is 1 %).")] = 0.0,
+    source: Annotated["str | Path | Iterable[str]", _FROM] = "-",
+    follow: Annotated[bool, _FOLLOW] = False,
+    scale_std: Annotated[float, _SCALE_STD] = 0.0,
     bias_std_m_s2: Annotated[float | None, BIAS_STD_M_S2.also("; else the data sheets'")] = None,
     unknown_start: Annotated[bool, UNKNOWN_START] = False,
     gyro: Annotated[bool, GYRO] = False,
@@ -112,10 +98,11 @@ def live(
     from gfimu.commands.opened import as_array
     from gfimu.rate.kalman import FilterSettings
     from gfimu.rate.sensing import SensorErrors, calibrated_bias_std
-    from gfimu.rate.stream import filter_stream, read_head
+    from gfimu.rate.stream import examined_lines, filter_stream, read_head
     from gfimu.recording.carried_array import carried_array
+    from gfimu.recording.lines import source_lines
 
-    metadata, lines = read_head(_lines(source, max_memory, follow=follow) if isinstance(source, str | Path) else source)
+    metadata, lines = read_head(source_lines(source, max_memory, follow=follow))
     geometry = carried_array(metadata, source="the stream") if array is None else as_array(array)
     if geometry is None:
         raise InputError("--array is missing, and the stream does not state its array; give --array")
@@ -125,7 +112,7 @@ def live(
         raise InputError("--rate is missing, and the stream does not state its sample rate; give it")
     if not isinstance(rate, int | float) or not _RATES[0] <= rate <= _RATES[1]:
         raise InputError(f"--rate {rate}: must be positive, {_RATES[0]:g} to {_RATES[1]:g} Hz")
-    lines = _examined(lines, geometry, rate, force=force)
+    lines = examined_lines(lines, geometry, rate, force=force)
     about = as_known_axis(axis).of(geometry)
     if about is not None:
         from gfimu.rate.axis.live import axis_stream
@@ -148,71 +135,3 @@ def live(
         stated = errors if is_sure else errors.with_part_gains(geometry)
         watched = WatchedRateFilter(live, LiveWatch(geometry, stated, 1.0 / rate, at_rest=not unknown_start))
     return filter_stream(lines, geometry, errors, 1.0 / rate, settings, fuse_gyro=gyro, watched=watched)
-
-
-def _examined(lines: Iterator[str], array: "AccelerometerArray", rate: float, *, force: bool) -> Iterator[str]:
-    """Pass lines on, and examine the samples of the first seconds once they are there."""
-    wanted = min(max(_FEWEST, round(_START_S * rate)), _MOST)
-    head: list[str] | None = []
-    samples = 0
-    for line in lines:
-        if head is not None:
-            head.append(line)
-            samples += bool(line.strip()) and not line.startswith("#")
-            if samples > wanted:  # the line that names the columns is none
-                _examine(head, array, rate, force=force)
-                head = None
-        yield line
-    if head is not None:
-        _examine(head, array, rate, force=force)
-
-
-def _examine(lines: list[str], array: "AccelerometerArray", rate: float, *, force: bool) -> None:
-    """Check the first samples of a stream as a recording; what can't be read is left to the filter."""
-    import numpy as np
-
-    from gfimu.rate.stream import StreamSample, stream_samples
-    from gfimu.recording import Recording
-    from gfimu.recording.checks import examine
-
-    found = [one for one in stream_samples(lines, array) if isinstance(one, StreamSample) and np.isfinite(one.t_s)]
-    later = np.diff([one.t_s for one in found], prepend=-np.inf) > 0.0
-    kept = [one for one, is_later in zip(found, later, strict=True) if is_later]
-    if len(kept) < _FEWEST or np.any(np.diff([one.t_s for one in kept]) <= 0.0):
-        return
-    run = Recording.from_arrays(
-        [one.t_s for one in kept],
-        np.array([one.readings for one in kept]),
-        array,
-        metadata={"sample_rate_hz": float(rate)},
-    )
-    examine(run, array, source="the stream's start", force=force)
-
-
-def _lines(source: str | Path, max_memory: "MemorySize | None", *, follow: bool) -> Iterator[str]:
-    """Lines of the source as they arrive."""
-    from gfimu.base.files.input_file import is_ordinary
-    from gfimu.base.files.memory import with_memory
-    from gfimu.recording.lines import recording_lines, whole_lines
-
-    if source == "-":
-        return whole_lines(sys.stdin.readline, "the stream")
-    if is_ordinary(source):
-        return recording_lines(with_memory(source, max_memory), follow=follow)
-    host, colon, port = str(source).removeprefix("socket://").rpartition(":")
-    if not colon or not port.isdigit():
-        raise InputError(f"--from {str(source)!r}: no such file; give a recording, - for standard input, or host:port")
-    return _socket_lines(str(source), host, int(port))
-
-
-def _socket_lines(source: str, host: str, port: int) -> Iterator[str]:
-    """Lines that a TCP server sends."""
-    import socket
-
-    from gfimu.recording.lines import whole_lines
-
-    with system_errors(f"--from {source!r}", "start the server first"):
-        connection = socket.create_connection((host, port), timeout=10)
-    connection.settimeout(None)
-    with connection, connection.makefile("r", encoding="utf-8", errors="replace") as stream:
-        yield from whole_lines(stream.readline, source)

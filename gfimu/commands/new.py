@@ -32,6 +32,15 @@ TEMPLATES = tuple(FILE_KINDS)
 SENDER = "sender"
 """The folder that can be begun: C files with which a board of one's own sends frames."""
 
+_BEGUN = (*TEMPLATES, SENDER)
+_KIND = Option(f"What to begin: {', '.join(_BEGUN)}.", "KIND", argument=True, offers=words(*_BEGUN))
+_FOLDER = Option(
+    "Of a sender: folder to write; without it, what to do with it is printed.", "[FOLDER]", argument=True,
+    writes=OutputFolder(()), what=SENDER,
+)  # fmt: skip
+_OUT = Option("File to write (.toml); printed without it.", "FILE", writes=TOML_FILE)
+_SCHEMA = Option("JSON schema to write (.json), for completion in an editor.", "FILE", writes=JSON_SCHEMA)
+
 
 @dataclass(frozen=True)
 class Begun(Declared):
@@ -58,34 +67,11 @@ def _report(text: str, given: Any) -> Begun:
 
 @command(report=_report, files=_files, results=lambda: (Begun,))
 def new(
-    kind: Annotated[
-        str,
-        Option(
-            f"What to begin: {', '.join((*TEMPLATES, SENDER))}.",
-            "KIND",
-            argument=True,
-            offers=words(*TEMPLATES, SENDER),
-        ),
-    ],
-    folder: Annotated[
-        str | Path | None,
-        Option(
-            "Of a sender: folder to write; without it, what to do with it is printed.",
-            "[FOLDER]",
-            argument=True,
-            kind=Path,
-            writes=OutputFolder(()),
-            what=SENDER,
-        ),
-    ] = None,
+    kind: Annotated[str, _KIND],
+    folder: Annotated[str | Path | None, _FOLDER] = None,
     *,
-    out: Annotated[
-        str | Path | None, Option("File to write (.toml); printed without it.", "FILE", kind=Path, writes=TOML_FILE)
-    ] = None,
-    schema: Annotated[
-        str | Path | None,
-        Option("JSON schema to write (.json), for completion in an editor.", "FILE", kind=Path, writes=JSON_SCHEMA),
-    ] = None,
+    out: Annotated[str | Path | None, _OUT] = None,
+    schema: Annotated[str | Path | None, _SCHEMA] = None,
 ) -> str:
     """Return a commented file to edit: an array, part, column map, twin, scenario, frame, stage, plan or brief.
 
@@ -113,9 +99,13 @@ def new(
             raise InputError(
                 "a sender is a folder of C files, without schema; name the folder: gfimu new sender FOLDER"
             )
-        return _new_sender(folder)
+        from firmware_bridge.sender.project import readme, write_project
+
+        if folder is not None:
+            write_project(folder)
+        return readme(SENDER if folder is None else Path(folder).resolve().name)
     if kind not in TEMPLATES:
-        raise unknown_name("kind", kind, (*TEMPLATES, SENDER))
+        raise unknown_name("kind", kind, _BEGUN)
     if folder is not None:
         raise InputError(f"a new {kind} is one file; name it with --out")
     text = find_model("templates", kind).read_text(encoding="utf-8")
@@ -128,11 +118,3 @@ def new(
     if out is not None:
         write_text(out, text)
     return text
-
-
-def _new_sender(folder: str | Path | None) -> str:
-    from firmware_bridge.sender.project import readme, write_project
-
-    if folder is not None:
-        write_project(folder)
-    return readme(SENDER if folder is None else Path(folder).resolve().name)

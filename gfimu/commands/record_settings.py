@@ -15,6 +15,14 @@ if TYPE_CHECKING:
 
 __all__ = ["BoardSettings", "RecordCallbacks"]
 
+_FORMAT = Option(
+    "Frame format: lpc1768 or mimu4444. Or a TOML file (gfimu new frame). Else lpc1768, or what is found.", "FORMAT",
+    name="--format", offers=completion.frames,
+)  # fmt: skip
+_RECONNECT = Option(
+    "Wait this long, s, for a port that is not there yet and for a lost connection (else: 0 and 60).", least=0.0
+)
+
 
 @dataclass(frozen=True)
 class BoardSettings:
@@ -48,23 +56,10 @@ class BoardSettings:
 
     rate: Annotated[int | None, RATE.also(", asked of the board, 10 to 3200")] = None
     range_g: Annotated[int | None, RANGE.also(", asked of the board", name="--range")] = None
-    form: Annotated[
-        str,
-        Option(
-            "Frame format: lpc1768 or mimu4444. Or a TOML file (gfimu new frame). Else lpc1768, or what is found.",
-            "FORMAT",
-            name="--format",
-            offers=completion.frames,
-        ),
-    ] = ""
+    form: Annotated[str, _FORMAT] = ""
     array: Annotated[str, ARRAY.also("; else the one that the board states, or the format's")] = ""
     baud: Annotated[int | None, BAUD.also("; else as the board is, raised if the rate needs it")] = None
-    reconnect: Annotated[
-        float | None,
-        Option(
-            "Wait this long, s, for a port that is not there yet and for a lost connection (else: 0 and 60).", least=0.0
-        ),
-    ] = None  # fmt: skip
+    reconnect: Annotated[float | None, _RECONNECT] = None
 
 
 @dataclass(frozen=True)

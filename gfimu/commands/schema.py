@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from gfimu.base.declared import Declared, figure, struct_of, structs_of
-from gfimu.base.errors import unknown_name
+from gfimu.base.errors import check_name
 from gfimu.base.files.schema import about
 from gfimu.commands.shell.completion import beginning
 from gfimu.commands.shell.declare import Option, command
@@ -89,6 +89,10 @@ def _offers(incomplete: str) -> list[tuple[str, str]]:
     return beginning(incomplete, dict.fromkeys(name.partition(" ")[0] for name in schema_names()))
 
 
+_COMMAND = Option("Command: estimate, or campaign table.", "COMMAND...", kind=list[str], argument=True, offers=_offers)
+_OUT = Option("JSON schema to write (.json); printed without it.", "FILE", writes=JSON_SCHEMA)
+
+
 def _run(given: Mapping[str, Any], as_json: bool) -> None:
     from gfimu.commands.shell.output import print_json, print_paths
 
@@ -100,23 +104,7 @@ def _run(given: Mapping[str, Any], as_json: bool) -> None:
 
 
 @command(run=_run, results=lambda: (dict[str, Any],))
-def schema(
-    command: Annotated[
-        str,
-        Option(
-            "Command: estimate, or campaign table.",
-            "COMMAND...",
-            kind=list[str],
-            argument=True,
-            offers=_offers,
-        ),
-    ],
-    *,
-    out: Annotated[
-        str | Path | None,
-        Option("JSON schema to write (.json); printed without it.", "FILE", kind=Path, writes=JSON_SCHEMA),
-    ] = None,
-) -> dict[str, Any]:
+def schema(command: Annotated[str, _COMMAND], *, out: Annotated[str | Path | None, _OUT] = None) -> dict[str, Any]:
     """Return the JSON schema (2020-12) of a command's output with ``--json``, errors included.
 
     Raises
@@ -135,8 +123,7 @@ def schema(
     from gfimu.base.files.atomic_file import write_text
 
     name = " ".join(command.split())
-    if name not in schema_names():
-        raise unknown_name("command", name, schema_names())
+    check_name("command", name, schema_names())
     kinds, parts = _kinds(name)
     references, definitions = msgspec.json.schema_components(
         [*kinds, struct_of(Failed), *parts], ref_template="#/$defs/{name}"

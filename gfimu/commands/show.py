@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from gfimu.base.declared import Declared, FileText, figure
 from gfimu.base.errors import InputError, unknown_name
-from gfimu.commands.list import catalogue, described
+from gfimu.commands.list import catalogue
 from gfimu.commands.shell import completion
 from gfimu.commands.shell.declare import Option, command
 from gfimu.commands.shell.options import MAX_MEMORY
@@ -29,6 +29,10 @@ if TYPE_CHECKING:
 __all__ = ["show"]
 
 _FILES = ("arrays", "parts", "maps", "twins", "scenarios", "frames")
+_NAME = Option(
+    "Name of an array, part, map, twin, scenario or effect; a file; or a recording.", "NAME", argument=True,
+    offers=completion.shown,
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -48,19 +52,7 @@ def _report(text: str, given: Any) -> Shown:
 
 
 @command(report=_report, results=lambda: (Shown,))
-def show(
-    name: Annotated[
-        str,
-        Option(
-            "Name of an array, part, map, twin, scenario or effect; a file; or a recording.",
-            "NAME",
-            argument=True,
-            offers=completion.shown,
-        ),
-    ],
-    *,
-    max_memory: Annotated["MemorySize | None", MAX_MEMORY] = None,
-) -> str:
+def show(name: Annotated[str, _NAME], *, max_memory: Annotated["MemorySize | None", MAX_MEMORY] = None) -> str:
     """Return the text of a shipped file, of a file of your own, of the array in a recording, or of an effect.
 
     A file of one's own is checked; of a recording the array file is returned.
@@ -84,18 +76,12 @@ def show(
         if name in list_models(kind):
             return find_model(kind, name).read_text(encoding="utf-8")
     if name in catalogue("effects"):
-        return _shown_effect(name)
-    raise unknown_name(
-        "name", name, [*(known for kind in _FILES for known, _ in described(kind)), *catalogue("effects")]
-    )
+        from sim.effects import added_effects
+        from sim.effects.catalogue import essence, every_effect
 
-
-def _shown_effect(name: str) -> str:
-    """Return what an effect is, its formula, parameters, rivals, and the experiment that separates it."""
-    from sim.effects import added_effects
-    from sim.effects.catalogue import essence, every_effect
-
-    return essence((every_effect() | added_effects())[name])
+        return essence((every_effect() | added_effects())[name])  # formula, parameters, rivals, experiment
+    files = (known for kind in _FILES for known in list_models(kind))
+    raise unknown_name("name", name, [*files, *catalogue("effects")])
 
 
 def _shown_file(name: str, max_memory: "MemorySize | None") -> str:

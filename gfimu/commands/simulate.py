@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from gfimu.base.errors import InputError
 from gfimu.commands.shell.declare import Option, command
-from gfimu.commands.shell.options import MAX_MEMORY, RECORDING_OUT, RRD, SCENARIO, SEED
+from gfimu.commands.shell.options import MAX_MEMORY, RECORDING_OUT, RRD, SCENARIO, SEED, SHARE
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -26,33 +26,25 @@ if TYPE_CHECKING:
 
 __all__ = ["simulate"]
 
-
-def _results() -> tuple[type, ...]:
-    from sim.simulation import Simulated
-
-    return (Simulated,)
+_CHANGES = Option("Change a key of the scenario file; may be repeated.", "KEY=VALUE", name="--set", kind=list[str])
+_RAW = Option("Keep the readings as counts of the converter.")
 
 
 def _recording(simulated: "Simulated") -> "Recording":
     return simulated.recording
 
 
-@command(results=_results, gives=_recording, doing=lambda given: f"simulating {given['scenario']}")
+@command(gives=_recording, doing=lambda given: f"simulating {given['scenario']}")
 def simulate(
     scenario: Annotated["Scenario | str | Path", SCENARIO.also(" or a twin file", argument=True)],
     *,
     out: Annotated["str | Path | None", RECORDING_OUT.also(needed=True)] = None,
     seed: Annotated[int, SEED] = 0,
-    changes: Annotated[
-        "Sequence[str]",
-        Option("Change a key of the scenario file; may be repeated.", "KEY=VALUE", name="--set", kind=list[str]),
-    ] = (),
-    raw: Annotated[bool, Option("Keep the readings as counts of the converter.")] = False,
+    changes: Annotated["Sequence[str]", _CHANGES] = (),
+    raw: Annotated[bool, _RAW] = False,
     max_memory: Annotated["MemorySize | None", MAX_MEMORY.also("; of the run, half of the machine's")] = None,
     rrd: Annotated["str | Path | None", RRD] = None,
-    progress: Annotated[
-        "Callable[[float], None] | None", Option("Called with the share done, 0 to 1.", shell=False)
-    ] = None,
+    progress: Annotated["Callable[[float], None] | None", SHARE] = None,
 ) -> "Simulated":
     """Simulate a scenario on the MuJoCo turntable and return what the board would have recorded.
 
@@ -78,8 +70,6 @@ def simulate(
     from sim.simulation import memory_of, summarise
     from sim.simulation import simulate as run_scenario
 
-    if seed < 0:
-        raise InputError(f"seed {seed}: must be zero or positive")
     if isinstance(scenario, Scenario):
         if changes:
             raise InputError("changes apply to a scenario file; change the Scenario object with dataclasses.replace")
@@ -89,32 +79,7 @@ def simulate(
         MemoryLimit.of_work(with_memory(scenario, max_memory)).needs(memory_of(run))
     recording = run_scenario(run, seed=seed, out=out, raw=raw, progress=progress)
     if rrd is not None:
-        _draw(rrd, run, recording)
+        from sim.drawing import draw_simulated
+
+        draw_simulated(rrd, run, recording)
     return summarise(run, recording)
-
-
-def _draw(rrd: "str | Path", run: "Scenario", recording: "Recording") -> None:
-    """Draw what was simulated: on its turntable, about a level or inclined axis, on a carriage, or free."""
-    from dataclasses import replace
-
-    from gfimu.visual import write_run
-    from sim.drawing import array_on_axis, rig_drawing
-    from sim.truth import known_motion
-
-    array, known = run.array, known_motion(recording)
-    hung = None if run.free else array_on_axis(run.world)
-    if hung is not None:
-        array, lift = hung
-        known = replace(known, position=known.position + lift)
-    on_table = not run.free and hung is None and run.world.slide is None
-    shapes = rig_drawing(run.world) if on_table else None
-    write_run(rrd, _in_si(recording), array, known=known, shapes=shapes, title=run.name)
-
-
-def _in_si(recording: "Recording") -> "Recording":
-    """Return the readings in m/s²."""
-    from dataclasses import replace
-
-    if recording.unit == "m_s2":
-        return recording
-    return replace(recording, readings=recording.readings * recording.metadata["lsb_m_s2"], unit="m_s2")

@@ -33,11 +33,11 @@ if TYPE_CHECKING:
 
 __all__ = ["view"]
 
-
-def _results() -> tuple[type, ...]:
-    from gfimu.visual.picture import Viewed
-
-    return (Viewed,)
+_FILE = Option(
+    "A .rrd file, or a recording or estimate (.csv, .parquet, .bin) to make one from.", "FILE", kind=Path,
+    argument=True, reads=True,
+)  # fmt: skip
+_OUT = Option("Rerun recording to write (.rrd); the viewer is not opened.", writes=RERUN)
 
 
 def _opened(viewed: "Viewed") -> Path:
@@ -66,27 +66,15 @@ def _show(given: Mapping[str, Any], as_json: bool) -> None:
         _opened(viewed)
 
 
-@command(results=_results, gives=_opened, run=_show)
+@command(gives=_opened, run=_show)
 def view(
-    file: Annotated[
-        "RecordingLike | Estimate | Diagnosis",
-        Option(
-            "A .rrd file, or a recording or estimate (.csv, .parquet, .bin) to make one from.",
-            "FILE",
-            kind=Path,
-            argument=True,
-            reads=True,
-        ),
-    ],
+    file: Annotated["RecordingLike | Estimate | Diagnosis", _FILE],
     *,
     array: Annotated["AccelerometerArray | str | Path | None", ARRAY.also("; else the recording's own")] = None,
     column_map: Annotated["ColumnMap | str | Path | None", MAP] = None,
     max_memory: Annotated["MemorySize | None", MAX_MEMORY] = None,
     axis: Annotated[AxisLike, AXIS_ALONE] = None,
-    out: Annotated[
-        "str | Path | None",
-        Option("Rerun recording to write (.rrd); the viewer is not opened.", kind=Path, writes=RERUN),
-    ] = None,
+    out: Annotated["str | Path | None", _OUT] = None,
     force: Annotated[bool, FORCE] = False,
 ) -> "Viewed":
     """Open a run in the rerun viewer, or write it as a picture.
@@ -125,20 +113,14 @@ def view(
     picture = picture_path(source) if out is None else Path(out)
     check_outputs([("out", picture, RERUN)], [] if source is None else [source])
     if isinstance(file, Diagnosis):
-        _picture_of_diagnosis(picture, file)
+        from gfimu.commands.diagnose import drawn_rig
+        from gfimu.diagnosis.report.picture import write_picture
+
+        write_picture(picture, file, rig=drawn_rig(file))
     else:
-        drawing = None if array is None else as_array(array)
+        drawn = None if array is None else as_array(array)
         run = (
-            file
-            if isinstance(file, Estimate)
-            else as_source(source or file, drawing, column_map, max_memory=max_memory)
+            file if isinstance(file, Estimate) else as_source(source or file, drawn, column_map, max_memory=max_memory)
         )
-        picture_of(run, picture, array=drawing, axis=as_known_axis(axis).axis, force=force)
+        picture_of(run, picture, array=drawn, axis=as_known_axis(axis).axis, force=force)
     return Viewed(picture, opens=out is None)
-
-
-def _picture_of_diagnosis(path: Path, diagnosis: "Diagnosis") -> None:
-    from gfimu.commands.diagnose import drawn_rig
-    from gfimu.diagnosis.report.picture import write_picture
-
-    write_picture(path, diagnosis, rig=drawn_rig(diagnosis))

@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from gfimu.array.integration import integrate_samples
-from gfimu.base.errors import InputError, unknown_name
+from gfimu.base.errors import InputError, check_name
 
 __all__ = [
     "ATTITUDE_METHODS",
@@ -84,8 +84,7 @@ def integrate_attitude(
     """
     if method is None:
         method = "coning" if alpha is None else "fourth_order"
-    if method not in ATTITUDE_METHODS:
-        raise unknown_name("attitude method", method, ATTITUDE_METHODS)
+    check_name("attitude method", method, ATTITUDE_METHODS)
     if method == "fourth_order" and alpha is None:
         raise InputError("attitude method 'fourth_order' needs alpha; give it or use method='coning'")
     # Of one layout: each other one would be compiled anew.

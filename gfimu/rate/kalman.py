@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gfimu.array.array import AccelerometerArray
 from gfimu.array.quadrature import STENCILS, even_weights
-from gfimu.base.errors import InputError, unknown_name
+from gfimu.base.errors import InputError, check_name
 from gfimu.rate.backward import backward
 from gfimu.rate.disagreement import MeasuredNoise
 from gfimu.rate.guard import GUARD_S, Guard
@@ -92,8 +92,7 @@ class FilterSettings:
     noise: MeasuredNoise | None = None
 
     def __post_init__(self) -> None:
-        if self.quadrature not in QUADRATURES:
-            raise unknown_name("quadrature", self.quadrature, QUADRATURES)
+        check_name("quadrature", self.quadrature, QUADRATURES)
         start = self.start_omega
         if start is not None and (np.shape(start) != (3,) or not np.isfinite(start).all()):
             raise InputError("start_omega must hold three numbers, rad/s, or be None for an unknown start")

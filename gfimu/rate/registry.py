@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from gfimu.base.errors import InputError, unknown_name
+from gfimu.base.errors import InputError, check_name
 from gfimu.base.plugins import plugins
 from gfimu.rate import solvers
 
@@ -91,8 +91,7 @@ def rate_method(name: str) -> RateMethod:
     if name in RATE_METHODS:
         return RATE_METHODS[name]
     known = {**RATE_METHODS, **plugins("gfimu.estimators", RateMethod, RATE_METHODS)}
-    if name not in known:
-        raise unknown_name("method", name, known)
+    check_name("method", name, known)
     return known[name]
 
 

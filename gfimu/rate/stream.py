@@ -21,6 +21,8 @@ from gfimu.rate.kalman import FilterSettings
 from gfimu.rate.live import LiveRateFilter
 from gfimu.rate.result import ChannelReport, RateEstimate
 from gfimu.rate.sensing import SensorErrors
+from gfimu.recording import Recording
+from gfimu.recording.checks import examine
 from gfimu.recording.quantities import GYRO_COLUMNS, READING_UNITS
 from gfimu.recording.tables.column_file import head_line
 
@@ -30,10 +32,14 @@ __all__ = [
     "StreamFilter",
     "StreamLayout",
     "StreamSample",
+    "examined_lines",
     "filter_stream",
     "read_head",
     "stream_samples",
 ]
+
+_START_S = 3.0  # of a stream, which are examined
+_FEWEST, _MOST = 50, 5000  # numerical: samples of that start, whatever the rate
 
 
 class StreamFilter(Protocol):
@@ -216,6 +222,49 @@ def read_head(lines: Iterable[str]) -> tuple[dict[str, Any], Iterator[str]]:
             break
         metadata |= head_line(line)
     return metadata, itertools.chain(head, rest)
+
+
+def examined_lines(
+    lines: Iterable[str], array: AccelerometerArray, rate: float, *, force: bool = False
+) -> Iterator[str]:
+    """Pass lines on, and examine the samples of the first seconds as a recording once they are there.
+
+    Parameters
+    ----------
+    lines : iterable of str
+        Lines of a stream, from the one that names the columns on.
+    array : AccelerometerArray
+        The array.
+    rate : float
+        Nominal sample rate, Hz.
+    force : bool
+        Whether to go on where the checks refuse the samples (`gfimu.recording.checks`).
+    """
+    wanted = min(max(_FEWEST, round(_START_S * rate)), _MOST)
+    head: list[str] = []
+    samples = 0
+    for line in lines:
+        if samples <= wanted:
+            head.append(line)
+            samples += bool(line.strip()) and not line.startswith("#")
+            if samples > wanted:  # the line that names the columns is none
+                _examine(head, array, rate, force=force)
+        yield line
+    if samples <= wanted:
+        _examine(head, array, rate, force=force)
+
+
+def _examine(lines: list[str], array: AccelerometerArray, rate: float, *, force: bool) -> None:
+    """Check the first samples of a stream; what can't be read is left to the filter."""
+    found = [one for one in stream_samples(lines, array) if isinstance(one, StreamSample) and np.isfinite(one.t_s)]
+    later = np.diff([one.t_s for one in found], prepend=-np.inf) > 0.0
+    kept = [one for one, is_later in zip(found, later, strict=True) if is_later]
+    times = np.array([one.t_s for one in kept])
+    if len(kept) < _FEWEST or np.any(np.diff(times) <= 0.0):
+        return
+    readings = np.array([one.readings for one in kept])
+    run = Recording.from_arrays(times, readings, array, metadata={"sample_rate_hz": float(rate)})
+    examine(run, array, source="the stream's start", force=force)
 
 
 def filter_stream(

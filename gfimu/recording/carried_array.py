@@ -7,7 +7,6 @@
 from __future__ import annotations
 
 import re
-import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -16,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from gfimu.array.array import AccelerometerArray
-from gfimu.base.errors import InputError, RecordingWarning
+from gfimu.base.errors import InputError, warn
 from gfimu.base.files.model_files import list_models, parse_toml
 from gfimu.recording.quantities import READING_UNITS
 
@@ -130,15 +129,11 @@ def warn_of_other_array(
     except InputError as error:
         if "array_toml" in metadata:
             text = str(error).partition(";")[0]
-            warnings.warn(f"{text}; {whose} array {used.name!r} is used", RecordingWarning, stacklevel=3)
+            warn(f"{text}; {whose} array {used.name!r} is used")
         return
     difference = "" if own is None else array_difference(own, used)
     if own is not None and difference:
-        warnings.warn(
-            f"{name}: recorded with array {own.name!r}, but {whose} {used.name!r} is used; they differ: {difference}",
-            RecordingWarning,
-            stacklevel=3,
-        )
+        warn(f"{name}: recorded with array {own.name!r}, but {whose} {used.name!r} is used; they differ: {difference}")
 
 
 def _damaged(source: str | Path, key: str, reason: str) -> InputError:

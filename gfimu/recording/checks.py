@@ -8,7 +8,6 @@ smaller contradiction, there is a warning; otherwise nothing is said.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
@@ -20,7 +19,7 @@ from numpy.typing import NDArray
 from gfimu.array.array import AccelerometerArray
 from gfimu.array.observability import unseen_motions
 from gfimu.array.parts.limits import PartLimits
-from gfimu.base.errors import InputError, RecordingWarning
+from gfimu.base.errors import InputError, warn
 from gfimu.recording.carried_array import warn_of_other_array
 from gfimu.recording.evidence.explanation import explanations
 from gfimu.recording.evidence.gathering import gather
@@ -140,7 +139,7 @@ def examine(
     ]
     refuse_or_warn(found, force=force)
     for one in found:
-        warnings.warn(one.text, RecordingWarning, stacklevel=2)
+        warn(one.text)
     return tuple(found)
 
 

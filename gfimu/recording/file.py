@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 from gfimu.array.array import AccelerometerArray
 from gfimu.array.parts.part import Part
 from gfimu.array.parts.plausible import MOST_CORRUPT, largest_of_array, largest_of_part, largest_reference
-from gfimu.base.errors import CorruptValueWarning, InputError, UnitError
+from gfimu.base.errors import CorruptValueWarning, InputError, UnitError, warn
 from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.recording.carried_array import carried_array
 from gfimu.recording.quantities import READING_UNITS, REFERENCE_UNITS, TIME_COLUMNS, reference_quantity
@@ -161,10 +160,9 @@ class _Corrupt:
                 "or leave the cell empty where a value is missing"
             )
         names = ", ".join(f"{name} {count}" for name, count in self._counts.items())
-        warnings.warn(
+        warn(
             f"{file}: left out {sum(self._counts.values())} corrupt values ({names}), the first at {self._first}",
             CorruptValueWarning,
-            stacklevel=4,
         )
         before = metadata.get("corrupt_values")
         known = {} if not isinstance(before, dict) else {n: c for n, c in before.items() if isinstance(c, int)}

@@ -8,7 +8,6 @@ out, `missing` ones stay missing, and a recording of gfimu's whose times do not 
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -20,7 +19,7 @@ from numpy.typing import NDArray
 
 from gfimu.array.array import AccelerometerArray
 from gfimu.array.parts.plausible import rails_of_array
-from gfimu.base.errors import InputError, RecordingWarning
+from gfimu.base.errors import InputError, warn
 from gfimu.base.files.metadata import schema_metadata
 from gfimu.recording.importing.clock import increasing_times
 from gfimu.recording.importing.column_map import ColumnMap, TimeSpec
@@ -123,7 +122,7 @@ def without_rows(
             continue
         kept &= ~found
         counts[kind] = int(found.sum())
-        warnings.warn(f"{source}: left out {counts[kind]} rows {said}", RecordingWarning, stacklevel=3)
+        warn(f"{source}: left out {counts[kind]} rows {said}")
     if not counts:
         return recording
     if not kept.any():
@@ -189,7 +188,7 @@ def _ordered(table: ColumnFile, column_map: ColumnMap) -> tuple[TableColumns, Ma
         sorted_out = increasing_times(t[rows], 0.0, f"{table.file}: column t_s", drop=column_map.drop)
         kept, dropped = sorted_out.rows, dict(sorted_out.dropped)
         for note in sorted_out.notes:
-            warnings.warn(note, RecordingWarning, stacklevel=4)
+            warn(note)
     columns = {name: pa.array(values[rows][kept], from_pandas=True) for name, values in found.items()}
     whole = TableColumns(pa.table(columns).replace_schema_metadata(schema_metadata(table.metadata)))
     whole.file = str(table.file)

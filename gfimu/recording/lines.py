@@ -6,21 +6,66 @@ import contextlib
 import json
 import math
 import os
+import socket
+import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
 
 from gfimu.base.errors import InputError
-from gfimu.base.files.input_file import check_input, first_bytes
+from gfimu.base.files.input_file import check_input, first_bytes, is_ordinary
+from gfimu.base.files.memory import MemorySize, with_memory
 from gfimu.recording.reading import LONGEST_LINE
 from gfimu.recording.recording import Recording
 
-__all__ = ["recording_lines", "whole_lines"]
+__all__ = ["recording_lines", "source_lines", "whole_lines"]
 
 _LOOK_AGAIN_S = 0.1
 _PARQUET = b"PAR1"
+
+
+def source_lines(
+    source: str | Path | Iterable[str], max_memory: MemorySize | None = None, *, follow: bool = False
+) -> Iterable[str]:
+    """Return the lines of a source as they arrive.
+
+    Parameters
+    ----------
+    source : str, Path or iterable of str
+        ``-`` for standard input, a recording, ``host:port`` of a TCP server, or the lines themselves.
+    max_memory : int or str, optional
+        Memory that reading a recording may take (`gfimu.base.files.memory`).
+    follow : bool
+        Of a recording: wait for more (`recording_lines`).
+
+    Raises
+    ------
+    InputError
+        If the source can't be opened.
+    """
+    if not isinstance(source, str | Path):
+        return source
+    if source == "-":
+        return whole_lines(sys.stdin.readline, "the stream")
+    if is_ordinary(source):
+        return recording_lines(with_memory(source, max_memory), follow=follow)
+    host, colon, port = str(source).removeprefix("socket://").rpartition(":")
+    if not colon or not port.isdigit():
+        raise InputError(f"--from {str(source)!r}: no such file; give a recording, - for standard input, or host:port")
+    return _socket_lines(str(source), host, int(port))
+
+
+def _socket_lines(source: str, host: str, port: int) -> Iterator[str]:
+    """Yield the lines that a TCP server sends."""
+    try:
+        connection = socket.create_connection((host, port), timeout=10)  # numerical: s
+    except OSError as error:
+        raise InputError(f"--from {source!r}: {error.strerror or error}; start the server first") from None
+    connection.settimeout(None)
+    with connection, connection.makefile("r", encoding="utf-8", errors="replace") as stream:
+        yield from whole_lines(stream.readline, source)
 
 
 def recording_lines(path: str | Path, *, follow: bool = False) -> Iterator[str]:

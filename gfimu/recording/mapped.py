@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,7 +13,7 @@ import pyarrow as pa
 from numpy.typing import ArrayLike, NDArray
 
 from gfimu.array.array import AccelerometerArray
-from gfimu.base.errors import InputError, RecordingWarning
+from gfimu.base.errors import InputError, warn
 from gfimu.base.files.input_file import as_path
 from gfimu.base.files.memory import MemorySize, with_memory
 from gfimu.base.files.metadata import schema_metadata
@@ -126,7 +125,7 @@ def mapped_recording(
     geometry = array or (AccelerometerArray.load(chosen.array) if chosen.array and len(pieces) == 1 else None)
     merged = _between(merged_piece(pieces), chosen)
     for note in merged.times.notes:
-        warnings.warn(note, RecordingWarning, stacklevel=2)
+        warn(note)
     return _recording(merged, chosen, geometry, [file.source for file in files])
 
 
@@ -155,7 +154,7 @@ def mapped_reference(
             f"{path}: map {column_map.name!r} gives no reference; add one under [reference], as tacho_rad_s"
         )
     for note in piece.times.notes:
-        warnings.warn(note, RecordingWarning, stacklevel=2)
+        warn(note)
     return piece.times.t_s, dict(piece.reference), piece.times.origin_s
 
 

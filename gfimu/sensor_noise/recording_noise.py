@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.base.declared import Declared, Table, figure
-from gfimu.base.errors import InputError, unknown_name
+from gfimu.base.errors import InputError, check_name
 from gfimu.base.results import Panel, PlottedResult, Series, text_column
 from gfimu.base.short_repr import short_repr
 from gfimu.recording import Recording
@@ -176,8 +176,7 @@ def recording_noise(
     >>> gfimu.recording_noise(gfimu.simulate("rest", seed=1)).unit
     'm_s2'
     """
-    if stretch not in STRETCHES:
-        raise unknown_name("stretch", stretch, STRETCHES)
+    check_name("stretch", stretch, STRETCHES)
     if stretch == "all":
         gaps = recording.gaps
         start, stop = 0, int(gaps[0]) + 1 if len(gaps) else len(recording)

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from gfimu.array.array import AccelerometerArray
-from gfimu.base.errors import InputError, unknown_name
+from gfimu.base.errors import InputError, check_name
 from gfimu.base.plugins import plugins
 from sim.effects import body, chain, digital, drifting, mechanical, mounting, rig, sensing, timing
 from sim.effects.base import Effect
@@ -177,8 +177,7 @@ def make_effect(
     known = known | {Unknown.name: Unknown}
     if name not in known:
         known = known | added_effects()
-    if name not in known:
-        raise unknown_name("effect", name, known)
+    check_name("effect", name, known)
     effect = known[name](parameters or {})
     if array is not None:
         effect.check(array)

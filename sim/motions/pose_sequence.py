@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from gfimu.base.errors import InputError, unknown_name
+from gfimu.base.errors import InputError, check_name
 from sim.motions.motion import BodyState
 
 __all__ = ["POSE_SETS", "PoseSequence"]
@@ -42,8 +42,7 @@ class PoseSequence:
     turn: float = 2.0
 
     def __post_init__(self) -> None:
-        if self.poses not in POSE_SETS:
-            raise unknown_name("set of poses", self.poses, POSE_SETS)
+        check_name("set of poses", self.poses, POSE_SETS)
         if not (self.rest > 0 and self.turn > 0):
             raise InputError("poses: rest_s and turn_s must be positive")
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.array.array import AccelerometerArray
-from gfimu.base.errors import InputError, one_line, unknown_name
+from gfimu.base.errors import InputError, check_name, one_line
 from sim.rigs.mujoco_warnings import mujoco_warnings
 from sim.rigs.rig_model import channel_places, free_spec, turntable_spec
 from sim.world import World
@@ -40,8 +40,7 @@ def array_as_mjcf(array: AccelerometerArray, rig: str = "turntable") -> str:
     InputError
         If there is no such rig, or MuJoCo refuses the array, such as two chips of one name.
     """
-    if rig not in RIGS:
-        raise unknown_name("rig", rig, RIGS)
+    check_name("rig", rig, RIGS)
     spec = free_spec(World(array)) if rig == "free_cube" else turntable_spec(World(array), rig)
     spec.modelname = one_line(array.name)
     try:

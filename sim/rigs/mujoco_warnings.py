@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 import mujoco
 
-from gfimu.base.errors import RecordingWarning
+from gfimu.base.errors import warn
 
 __all__ = ["mujoco_warnings"]
 
@@ -29,4 +28,4 @@ def mujoco_warnings(source: str = "simulation") -> Iterator[None]:
     finally:
         mujoco.set_mju_user_warning(before)
         for text in dict.fromkeys(" ".join(one.split()) for one in texts):
-            warnings.warn(f"{source}: {text}", RecordingWarning, stacklevel=3)
+            warn(f"{source}: {text}")

@@ -5,14 +5,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from firmware_bridge.frames.decoder import StreamCounts
-from firmware_bridge.host.mounting.on_board import mounting_words
+from firmware_bridge.frames.decoder import FrameFormat, StreamCounts
+from firmware_bridge.host.mounting.on_board import candidate_arrays, mounting_words
+from firmware_bridge.host.record_report import RecordReport
 from firmware_bridge.host.record_session import Batch
 from gfimu.array.array import AccelerometerArray
 from gfimu.recording import Recording
 from gfimu.recording.checks import Finding, check_recording
 
-__all__ = ["FirstSamples", "open_array_text", "other_array_text"]
+__all__ = ["FirstSamples", "array_doubts"]
 
 _KEPT = 120_000  # samples: twenty minutes at 100 Hz; the check of more takes as long and shows no more
 
@@ -39,17 +40,38 @@ class FirstSamples:
         return check_recording(Recording(t, lsb * counts, array.channels), array)
 
 
-def other_array_text(board_array: str, array: AccelerometerArray) -> str:
-    """Say that a board states another array than the one that was given at the host; empty if it does not."""
-    if not board_array or board_array == array.name:
-        return ""
-    return (
-        f"the board states array {board_array!r}, and {array.name!r} was given: the recording carries {array.name!r}; "
-        "leave --array out, or build the firmware for the array that is on the board (gfimu firmware build --array)"
+def array_doubts(
+    report: RecordReport, samples: FirstSamples, form: FrameFormat, known: AccelerometerArray | None
+) -> list[str]:
+    """Say where the array of a recording is open, or contradicted by the board or by what it sent.
+
+    Parameters
+    ----------
+    report : RecordReport
+        What was recorded.
+    samples : FirstSamples
+        Its first samples.
+    form : FrameFormat
+        Format of the board.
+    known : AccelerometerArray, optional
+        The array as it was settled before the first sample.
+    """
+    if not report.array:
+        lsb = form.count_size(AccelerometerArray.load(form.array))
+        return [_open_array_text(candidate_arrays(form), samples, lsb, str(report.path))]
+    array = known or AccelerometerArray.load(report.array)  # one that was stated late is a shipped one
+    texts = [finding.text for finding in samples.findings(array, form.count_size(array))]
+    if not report.board_array or report.board_array == array.name:
+        return texts
+    other = (
+        f"the board states array {report.board_array!r}, and {array.name!r} was given: the recording carries "
+        f"{array.name!r}; leave --array out, or build the firmware for the array that is on the board "
+        "(gfimu firmware build --array)"
     )
+    return [other, *texts]
 
 
-def open_array_text(candidates: tuple[AccelerometerArray, ...], fit: FirstSamples, lsb: float, out: str) -> str:
+def _open_array_text(candidates: tuple[AccelerometerArray, ...], fit: FirstSamples, lsb: float, out: str) -> str:
     """Say that nobody stated the array, which ones have these channels, and what the samples say of them."""
     named = [f"{array.name} ({mounting_words(array)})" for array in candidates]
     fitting = [array.name for array in candidates if not any(one.refused for one in fit.findings(array, lsb))]

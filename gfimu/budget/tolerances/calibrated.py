@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.array.array import AccelerometerArray
-from gfimu.base.errors import InputError, unknown_name
+from gfimu.base.errors import InputError, check_name
 from gfimu.base.short_repr import short_repr
 from gfimu.budget.tolerances.known_motion import KnownMotion
 from gfimu.budget.tolerances.signatures import axis_pairs, signatures, turned_readings
@@ -123,8 +123,7 @@ def calibrations_of(array: AccelerometerArray, motion: KnownMotion) -> tuple[str
 
 def check_calibration(calibration: str, array: AccelerometerArray, motion: KnownMotion) -> None:
     """Raise `InputError` for a calibration that is unknown, or that the array or the motion do not allow."""
-    if calibration not in CALIBRATIONS:
-        raise unknown_name("calibration", calibration, CALIBRATIONS)
+    check_name("calibration", calibration, CALIBRATIONS)
     reason = _refusal(calibration, array, motion)
     if reason is not None:
         raise InputError(f"calibration {calibration!r}: {reason}")

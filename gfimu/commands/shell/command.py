@@ -28,45 +28,40 @@ def with_width(ctx: Any) -> None:
     ctx.terminal_width = max(min(shutil.get_terminal_size((80, 24)).columns, _WIDEST), _NARROWEST) - 1
 
 
-class GfimuCommand(TyperCommand):
-    """A command: plain help with examples at its end."""
+class _Parser:
+    """What commands and groups of commands share: plain help with examples at its end, and errors that help."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parse arguments; the error for a wrong option names the nearest, and unusable numbers are refused."""
         with_width(ctx)
         try:
-            rest = super().parse_args(ctx, args)
+            rest: list[str] = super().parse_args(ctx, args)  # type: ignore[misc]
         except Exception as error:
-            _suggest_option(error, self.get_params(ctx))
+            _suggest_option(error, ctx.command.get_params(ctx))
             raise
-        _check_numbers(self.get_params(ctx), ctx.params)
+        _check_numbers(ctx.command.get_params(ctx), ctx.params)
         return rest
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Write the help."""
+        write_help(self, ctx, formatter)
+
+
+class GfimuCommand(_Parser, TyperCommand):
+    """A command."""
 
     def collect_usage_pieces(self, ctx: Any) -> list[str]:
         """Return the words of the usage line: an argument stands as its metavar."""
         arguments = [param for param in self.get_params(ctx) if param.param_type_name == "argument"]
         return ["[OPTIONS]", *(param.metavar or param.name.upper() for param in arguments)]
 
-    def format_help(self, ctx: Any, formatter: Any) -> None:
-        """Write the help."""
-        write_help(self, ctx, formatter)
-
     def shell_complete(self, ctx: Any, incomplete: str) -> list[Any]:
         """Return the options that a shell offers."""
         return [item for item in super().shell_complete(ctx, incomplete) if item.value != "-h"]
 
 
-class GfimuGroup(TyperGroup):
+class GfimuGroup(_Parser, TyperGroup):
     """A command with commands of its own."""
-
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Parse the arguments of the group itself."""
-        with_width(ctx)
-        try:
-            return super().parse_args(ctx, args)
-        except Exception as error:
-            _suggest_option(error, self.get_params(ctx))
-            raise
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Find a command by its name; the error for a wrong one names the nearest."""
@@ -84,10 +79,6 @@ class GfimuGroup(TyperGroup):
         ]
         with formatter.section("Commands"):
             formatter.write_dl(rows)
-
-    def format_help(self, ctx: Any, formatter: Any) -> None:
-        """Write the help."""
-        write_help(self, ctx, formatter)
 
 
 class RunGroup(GfimuGroup):

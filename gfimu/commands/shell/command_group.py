@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, MutableMapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import typer
 from typer.completion import install_callback, show_callback
 
-from gfimu.base.errors import unknown_name
+from gfimu.base.errors import check_name
 from gfimu.commands.shell.assemble import shell_command
 from gfimu.commands.shell.command import CommandApp, GfimuGroup, RunGroup
 from gfimu.commands.shell.command_list import COMMANDS, JOBS, declared_commands, help_line
@@ -30,7 +30,7 @@ class CommandGroup(GfimuGroup):
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(**settings)
-        self.commands = _Commands()
+        self.commands = _Commands()  # type: ignore[assignment]
 
     def shell_complete(self, ctx: Any, incomplete: str) -> list[Any]:
         """Return the commands that begin so, without importing any, or the options of the program."""
@@ -42,8 +42,7 @@ class CommandGroup(GfimuGroup):
         """Parse the arguments; ``help COMMAND`` is ``COMMAND --help``, and a shell may be named for its completion."""
         ctx.meta[JSON_ASKED] = "--json" in args
         if len(args) == 2 and args[0] in _COMPLETION:  # Typer would ignore the name and take the shell that it detects
-            if args[1] not in _SHELLS:
-                raise unknown_name("shell", args[1], _SHELLS)
+            check_name("shell", args[1], _SHELLS)
             _COMPLETION[args[0]](ctx, None, args[1])  # type: ignore[arg-type]
         if args and args[0] == _HELP:
             args = [*args[1:], "--help"]
@@ -58,28 +57,21 @@ class CommandGroup(GfimuGroup):
                 formatter.write_dl([(name.ljust(width), help_line(name)) for name in names])
 
 
-class _Commands(MutableMapping[str, Any]):
+class _Commands(Mapping[str, Any]):
     """Commands by name, each made when it is asked for."""
 
     def __init__(self) -> None:
         self._loaded: dict[str, Any] = {}
 
     def __getitem__(self, name: str) -> Any:
+        if name not in COMMANDS:
+            raise KeyError(name)
         if name not in self._loaded:
             app = CommandApp()
             app.callback()(_no_options)  # a group even where a file registers one command
-            if name not in COMMANDS:
-                raise KeyError(name)
             add_commands(app, name, declared_commands(name))
-            group = typer.main.get_command(app)
-            self._loaded |= group.commands  # type: ignore[attr-defined]
+            self._loaded[name] = typer.main.get_command(app).commands[name]  # type: ignore[attr-defined]
         return self._loaded[name]
-
-    def __setitem__(self, name: str, command: Any) -> None:
-        self._loaded[name] = command
-
-    def __delitem__(self, name: str) -> None:
-        del self._loaded[name]
 
     def __iter__(self) -> Iterator[str]:
         return iter(COMMANDS)

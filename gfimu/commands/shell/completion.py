@@ -24,6 +24,7 @@ __all__ = [
 ]
 
 Values = list[tuple[str, str]]
+Offers = Callable[[str], Values]
 
 _UNKNOWN = "unknown"  # stands in the catalogue for what no effect explains; no run can be designed for it
 
@@ -37,43 +38,29 @@ class Offer:
     type: str = "plain"
 
 
-def words(*fixed: str) -> Callable[[str], Values]:
+def words(*fixed: str) -> Offers:
     """Return the function that offers fixed words."""
+    return lambda incomplete: beginning(incomplete, fixed)
+
+
+def _models(kind: str) -> Offers:
+    """Return the function that offers the files of a kind that come with gfimu."""
 
     def offer(incomplete: str) -> Values:
-        return beginning(incomplete, fixed)
+        from gfimu.base.files.model_files import list_models
+
+        return beginning(incomplete, list_models(kind))
 
     return offer
 
 
-def arrays(incomplete: str) -> Values:
-    """Offer the arrays that come with gfimu."""
-    return _models("arrays", incomplete)
-
-
-def parts(incomplete: str) -> Values:
-    """Offer the parts that come with gfimu."""
-    return _models("parts", incomplete)
-
-
-def maps(incomplete: str) -> Values:
-    """Offer the column maps that come with gfimu."""
-    return _models("maps", incomplete)
-
-
-def scenarios(incomplete: str) -> Values:
-    """Offer the scenarios that come with gfimu."""
-    return _models("scenarios", incomplete)
-
-
-def twins(incomplete: str) -> Values:
-    """Offer the twins that come with gfimu."""
-    return _models("twins", incomplete)
+arrays, parts, maps = _models("arrays"), _models("parts"), _models("maps")
+scenarios, twins, _frames = _models("scenarios"), _models("twins"), _models("frames")
 
 
 def frames(incomplete: str) -> Values:
     """Offer the frame formats that come with gfimu, and those that are built in."""
-    return [*beginning(incomplete, ("lpc1768", "mimu4444")), *_models("frames", incomplete)]
+    return [*beginning(incomplete, ("lpc1768", "mimu4444")), *_frames(incomplete)]
 
 
 def effects(incomplete: str) -> Values:
@@ -90,20 +77,14 @@ def objectives(incomplete: str) -> Values:
 
 def shown(incomplete: str) -> Values:
     """Offer all that `gfimu show` prints by name."""
-    kinds = ("arrays", "parts", "maps", "twins", "scenarios", "frames")
-    return [*(one for kind in kinds for one in _models(kind, incomplete)), *_catalogued(incomplete)]
+    kinds = (arrays, parts, maps, twins, scenarios, _frames, _catalogued)
+    return [name for offer in kinds for name in offer(incomplete)]
 
 
 def _catalogued(incomplete: str) -> Values:
     from gfimu.model.effect_catalogue import effect_catalogue
 
     return beginning(incomplete, effect_catalogue())
-
-
-def _models(kind: str, incomplete: str) -> Values:
-    from gfimu.base.files.model_files import list_models
-
-    return beginning(incomplete, list_models(kind))
 
 
 def beginning(incomplete: str, names: Iterable[str]) -> Values:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import inspect
 import re
-import shlex
+import textwrap
 from typing import Any
 
 __all__ = ["examples_of", "write_help"]
@@ -34,6 +34,7 @@ _SHORT = 60  # columns below which a description stands under its option
 _FIRST_COLUMN = 28  # columns of names before descriptions
 _SHORT_FIRST_COLUMN = 4
 _INDENT = "  "
+_NO_BREAK = "\xa0"
 
 
 def examples_of(help_text: str | None) -> list[tuple[str, str]]:
@@ -109,21 +110,8 @@ def _write_examples(formatter: Any, examples: list[tuple[str, str]]) -> None:
 
 def _pieces(line: str, width: int) -> list[str]:
     """Break a command line between words so that each piece fits, all but the last ending in a backslash."""
-    lexer = shlex.shlex(line, posix=False, punctuation_chars=False)
-    lexer.whitespace_split = True
-    lexer.commenters = ""
-    units: list[str] = []  # an option with its values
-    for word in lexer:
-        if units and not word.startswith("--"):
-            units[-1] += f" {word}"
-        else:
-            units.append(word)
-    pieces, current = [], ""
-    for unit in units:
-        longer = f"{current} {unit}" if current else unit
-        if current and len(longer) > width - 2:
-            pieces.append(f"{current} \\")
-            current = f"    {unit}"
-        else:
-            current = longer
-    return [*pieces, current]
+    units = (option.replace(" ", _NO_BREAK) for option in re.split(" (?=--)", line))  # an option with its values
+    pieces = textwrap.wrap(
+        " ".join(units), width - 2, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False
+    )
+    return " \\\n".join(pieces).replace(_NO_BREAK, " ").splitlines()

@@ -29,9 +29,9 @@ BAUD = Option("Speed of the line, bits per second", "BAUD")
 BIAS_MG = Option("Bias of each channel, 1 σ, mg", "MG")
 BIAS_STD_M_S2 = Option("Standard deviation of each channel's bias, m/s²", "M/S²")
 BY = Option("Factor to group by; may be repeated. A range is cut into fifths.", "FACTOR", kind=list[str])
-CALIBRATION = Option("Calibration to apply first (.json, from gfimu calibrate).", "FILE", kind=Path, reads=True)
+CALIBRATION = Option("Calibration to apply first (.json, from gfimu calibrate).", "FILE", reads=True)
 CHIPS = Option("Number of chips", "N")
-DATA = Option("Folder of the measured data, for the set real.", "DIR", kind=Path, reads=True)
+DATA = Option("Folder of the measured data, for the set real.", "DIR", reads=True)
 DURATION = Option("Length of the run, s", "S")
 FORCE = Option("Go on where the checks of units, time, array and channels refuse the file")
 GRAVITY = Option("Local gravity, m/s²", "M/S²")
@@ -50,15 +50,15 @@ MAX_MEMORY = Option(
     "Memory that reading a file may take, as 2GB; by default four times its size and 500 MB", "SIZE", kind=str
 )
 NOISE_UG = Option("White noise of each channel, one-sided density, µg/√Hz", "UG")
-PICTURE = Option("Picture to write (.png, .svg, .pdf)", "FILE", kind=Path, writes=PICTURE_FILE)
+PICTURE = Option("Picture to write (.png, .svg, .pdf)", "FILE", writes=PICTURE_FILE)
 PORT = Option("Port of the board", "PORT")
 PROGRESS = Option("Called with the share done, 0 to 1, and a line of text", shell=False)
 RANGE = Option("Range of the chips: ±2, 4, 8 or 16 g", "G")
 RATE = Option("Sample rate, Hz", "HZ")
 RECORDINGS = Option("Recordings of one rig: .csv, .parquet, .bin", "RUN...", kind=list[Path], argument=True, reads=True)
-RECORDING_OUT = Option("Recording to write (.csv, .parquet).", "FILE", kind=Path, writes=RECORDING, what="recording")
+RECORDING_OUT = Option("Recording to write (.csv, .parquet).", "FILE", writes=RECORDING, what="recording")
 REST_THRESHOLD = Option("Threshold of rest, reading unit squared; else from the data.", "UNIT²")
-RRD = Option("Rerun recording to write (.rrd)", "FILE", kind=Path, writes=RERUN)
+RRD = Option("Rerun recording to write (.rrd)", "FILE", writes=RERUN)
 SCENARIO = Option(
     "Scenario: a name, or a scenario file (.toml)", "SCENARIO", offers=completion.scenarios, kind=str, reads=True
 )
@@ -69,6 +69,7 @@ SETS = Option(
     kind=list[str],
     offers=completion.words("own", "independent", "unlisted", "dcmotor", "real"),
 )
+SHARE = Option("Called with the share done, 0 to 1.", shell=False)
 SPEED_RAD_S = Option("Angular rate, rad/s", "RAD/S")
 SPLIT = Option(
     "Worlds to develop on (dev), or those of the published table (test).",
@@ -140,8 +141,7 @@ MAP = replace(MAP_OF_TABLE, without=("table",))
 
 def _reference_map_from_options(
     reference_map: Annotated[
-        str | None,
-        Option("Column map of the file of references.", "MAP", offers=completion.maps, reads=True),
+        str | None, Option("Column map of the file of references.", "MAP", offers=completion.maps, reads=True)
     ] = None,
     reference_map_set: Annotated[
         list[str], Option("Set a key of the reference's column map; may be repeated.", "KEY=VALUE")

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.base.errors import InputError, RecordingWarning
+from gfimu.base.errors import InputError, warn
 from gfimu.diagnosis.data.integrity import IntegrityReport, check_integrity
 from gfimu.diagnosis.data.plausibility import refuse_implausible
 from gfimu.diagnosis.data.run import Run, prepare_run, smooth_rate
@@ -100,5 +99,5 @@ def _check(model: WorldModel, run: Run, predict: Predict, *, force: bool) -> Int
     except InputError as error:
         if not force:
             raise InputError(f"{error}; --force (force=True) goes on nevertheless") from None
-        warnings.warn(str(error), RecordingWarning, stacklevel=2)
+        warn(str(error))
     return check_integrity(model, run, prediction)

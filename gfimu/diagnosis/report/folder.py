@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Collection, Mapping
 from pathlib import Path
 
-from gfimu.base.errors import OmittedFileWarning
+from gfimu.base.errors import OmittedFileWarning, warn
 from gfimu.base.files.atomic_file import atomic_folder
 from gfimu.base.files.outputs import OutputFolder, check_outputs
 from gfimu.base.optional_packages import install_command, missing, packages_of
@@ -52,10 +51,9 @@ def warn_of_omitted() -> None:
     absent = missing(*_NEEDS.values())
     if absent:
         names = " and ".join(name for name in FILES if _NEEDS.get(name) in absent)
-        warnings.warn(
+        warn(
             f"{names} not written: {packages_of(absent)} not installed; run: {install_command(absent)}",
             OmittedFileWarning,
-            stacklevel=3,
         )
 
 

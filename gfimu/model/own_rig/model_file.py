@@ -8,7 +8,7 @@ from pathlib import Path
 from types import FunctionType
 from typing import Annotated
 
-from gfimu.base.errors import InputError, naming, unknown_name
+from gfimu.base.errors import InputError, check_name, naming
 from gfimu.base.files.input_file import is_ordinary
 from gfimu.base.files.model_files import read_toml
 from gfimu.base.files.schema import Table, about, read
@@ -81,8 +81,7 @@ def _of_file(path: Path, *, allow_code: bool) -> WorldModel | None:
             if one.name == UnnamedCause.name:
                 effects.append(UnnamedCause.of_file(one.parameters))
                 continue
-            if one.name not in families:
-                raise unknown_name("effect", one.name, families)
+            check_name("effect", one.name, families)
             effects.append(families[one.name](one.parameters))
         return model.extended(effects)
 

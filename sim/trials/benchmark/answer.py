@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -10,6 +11,7 @@ import msgspec
 
 from gfimu.base.errors import InputError
 from sim.json_lines import read_lines, six_digits, write_lines
+from sim.trials.benchmark.release import cases, find_case
 
 __all__ = ["Answer", "CauseAnswer", "ParameterAnswer", "answer_of", "answer_schema", "read_answers", "write_answers"]
 
@@ -76,13 +78,20 @@ def answer_of(found: Mapping[str, Any], where: str) -> Answer:
         raise InputError(f"{where}: {error}; gfimu benchmark worlds writes answer.schema.json") from None
 
 
-def read_answers(path: str | Path) -> list[Answer]:
+def read_answers(path: str | Path, *, complete: bool = False) -> list[Answer]:
     """Read answers from lines of JSON, packed (``.xz``) or not.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    complete : bool
+        Whether to add an error for each world of its sets and splits that the file lacks.
 
     Raises
     ------
     InputError
-        If the file is not there, holds none, or a line is no answer.
+        If the file is not there, holds none, a line is no answer, or a world has two by one method.
     """
     file = Path(path)
     lines = read_lines(file, "give answers as lines of JSON (.jsonl or .jsonl.xz)")
@@ -99,7 +108,22 @@ def read_answers(path: str | Path) -> list[Answer]:
             found.append(answer_of(value, where))
     if not found:
         raise InputError(f"{file}: holds no answers; give one JSON object per line")
-    return found
+    (method, world), count = Counter((answer.method, answer.world) for answer in found).most_common(1)[0]
+    if count > 1:
+        raise InputError(f"{file}: two answers for {world} by method {method!r}; give one")
+    return found + (_missing(found) if complete else [])
+
+
+def _missing(answers: Sequence[Answer]) -> list[Answer]:
+    """Return an error for each world without an answer, of the sets and splits that a method has answered."""
+    given = {(answer.method, answer.world) for answer in answers}
+    groups = {(answer.method, case.set_name, case.split) for answer in answers for case in [find_case(answer.world)]}
+    return [
+        Answer(case.world, "error", method=method, error="no answer")
+        for method, name, split in sorted(groups)
+        for case in cases(name, split)
+        if (method, case.world) not in given
+    ]
 
 
 def write_answers(answers: Iterable[Answer], path: str | Path) -> None:

@@ -14,7 +14,7 @@ from gfimu.model.user_code import user_function
 from sim.trials.benchmark.answer import Answer, answer_of
 from sim.trials.benchmark.baselines import BASELINES, always_unknown, best_single, greedy_bic, oracle, sysid
 from sim.trials.benchmark.real import real_task
-from sim.trials.benchmark.release import MEASURED, RELEASE, cases, find_case
+from sim.trials.benchmark.release import MEASURED, RELEASE, chosen_cases, find_case
 from sim.trials.benchmark.truth_file import task_of
 from sim.trials.benchmark.world import Task
 from sim.trials.sweep.dataset import Dataset
@@ -67,7 +67,7 @@ def benchmark_plan(
     reference : str
         Method, as `named_method` returns it.
     sets : sequence of str
-        Names of sets.
+        Names of sets; none: all that are drawn.
     split : str
         ``dev`` or ``test``.
     limit : int, optional
@@ -80,7 +80,7 @@ def benchmark_plan(
     InputError
         If there is no such set or split, or measured data are needed and not there.
     """
-    chosen = [case for name in sets for case in cases(name, split)[:limit]]
+    chosen = chosen_cases(sets, split, limit)
     if not chosen:
         raise InputError(f"{', '.join(sets)}: has no worlds in the split {split}; choose another one")
     for case in chosen:

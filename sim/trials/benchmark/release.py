@@ -17,7 +17,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from gfimu.base.declared import Declared, figure
-from gfimu.base.errors import InputError, unknown_name
+from gfimu.base.errors import InputError, check_name
 
 __all__ = [
     "MEASURED",
@@ -28,6 +28,7 @@ __all__ = [
     "Case",
     "SetInfo",
     "cases",
+    "chosen_cases",
     "find_case",
     "release_hash",
 ]
@@ -207,10 +208,8 @@ def cases(set_name: str, split: str) -> tuple[Case, ...]:
     InputError
         If there is no such set or split.
     """
-    if set_name not in SETS:
-        raise unknown_name("set", set_name, SETS)
-    if split not in SPLITS:
-        raise unknown_name("split", split, SPLITS)
+    check_name("set", set_name, SETS)
+    check_name("split", split, SPLITS)
     if set_name == "own":
         made = _made("own", split, ["campaign"], _drawn("own", split, _LIBRARY, {1: 35, 2: 12, 0: 13}))
     elif set_name == "independent":
@@ -223,6 +222,12 @@ def cases(set_name: str, split: str) -> tuple[Case, ...]:
     else:
         made = [Case("real", split, index, MEASURED) for index in range(2 if split == "test" else 0)]
     return tuple(made)
+
+
+def chosen_cases(sets: Iterable[str], split: str, limit: int | None = None) -> list[Case]:
+    """Return the worlds of some sets, at most so many of each; of all sets that are drawn where none is named."""
+    drawn = (name for name in SETS if name != "real")
+    return [case for name in dict.fromkeys(sets) or drawn for case in cases(name, split)[:limit]]
 
 
 def find_case(world: str) -> Case:

@@ -12,7 +12,7 @@ import hashlib
 import json
 import math
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,14 +21,19 @@ from typing import Any
 import numpy as np
 
 from gfimu.base.errors import InputError
+from gfimu.base.files.atomic_file import write_text
 from gfimu.recording import Recording
 from sim.json_lines import read_lines, six_digits, write_lines
+from sim.trials.benchmark.answer import answer_schema
 from sim.trials.benchmark.drawing import draw
 from sim.trials.benchmark.release import MEASURED, SETS, SPLITS, TRUTH_FILE, Case, cases, find_case
 from sim.trials.benchmark.ties import free_distance_and_ties
 from sim.trials.benchmark.world import Task, Truth
 
-__all__ = ["Fixed", "digest_of", "fixed_world", "task_of", "truths"]
+__all__ = ["SCHEMA_FILE", "Fixed", "digest_of", "fixed_world", "task_of", "truths", "write_tasks"]
+
+SCHEMA_FILE = "answer.schema.json"
+"""The file beside the worlds that are written, which describes an answer."""
 
 LEAST_VISIBLE = 7.0
 """d′ with the drive unknown below which what is hidden counts as not to be seen: such a draw is replaced."""
@@ -93,6 +98,40 @@ def task_of(world: str) -> Task:
     """Draw a world of the release and return what a method is given; raises `InputError` for an unknown name."""
     fixed = fixed_world(world)
     return draw(fixed.case, fixed.attempt).task
+
+
+def write_tasks(
+    worlds: Sequence[str], out: str | Path, file_type: str, progress: Callable[[int, int], None] | None = None
+) -> list[Path]:
+    """Write what a method is given of worlds as plain files, a folder each, and the schema of answers.
+
+    Parameters
+    ----------
+    worlds : sequence of str
+        Their names.
+    out : str or Path
+        Folder to write.
+    file_type : str
+        ``parquet`` or ``csv``.
+    progress : callable, optional
+        Called with the number of worlds that are done and of all.
+
+    Returns
+    -------
+    list of Path
+        The folders of the worlds.
+    """
+    folders = [Path(out) / world for world in worlds]
+    for number, (world, folder) in enumerate(zip(worlds, folders, strict=True), start=1):
+        task = task_of(world)
+        folder.mkdir(parents=True, exist_ok=True)
+        task.recording.write(folder / f"recording.{file_type}")
+        write_text(folder / "twin.toml", task.twin.to_toml())
+        if progress is not None:
+            progress(number, len(worlds))
+    Path(out).mkdir(exist_ok=True)
+    write_text(Path(out) / SCHEMA_FILE, json.dumps(answer_schema(), indent=2) + "\n")
+    return folders
 
 
 def make(case: Case) -> dict[str, Any]:

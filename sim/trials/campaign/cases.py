@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from functools import partial
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 import numpy as np
 
-from gfimu.base.errors import InputError, RecordingWarning, unknown_name
+from gfimu.base.errors import InputError, check_name, unknown_name, warn
 from sim.trials.campaign.drive import DriveWork, as_toml
 
 if TYPE_CHECKING:
@@ -144,7 +143,7 @@ def check_factors(plan: PlanFile, first: Case, source: str) -> None:
             others = ((other, one) for other, one in _listed(plan) if other != name)
             if error and all(_refusal(check, first, {name: value, other: one}) for other, one in others):
                 text = f"{source}: [factors]: every case with {name} = {value!r} will fail: {error}"
-                warnings.warn(text, RecordingWarning, stacklevel=2)
+                warn(text)
     except InputError as error:
         raise InputError(f"{source}: [factors]: {error}") from None
 
@@ -153,8 +152,7 @@ def _check_of(plan: PlanFile, first: Case) -> Callable[[Case], object]:
     """Return what sets a case up without running it; refuses unknown factors."""
     if plan.kind == "diagnose":
         for name in plan.factors:
-            if name not in _OF_STUDY:
-                raise unknown_name("factor of kind 'diagnose'", name, _OF_STUDY)
+            check_name("factor of kind 'diagnose'", name, _OF_STUDY)
         return _study_case
     if plan.kind == "measure":
         from sim.trials.campaign.worlds import check_world_factors
@@ -209,10 +207,8 @@ def _setting(case: Case) -> tuple[Scenario, str, str]:
     rest = {key: value for key, value in case.values.items() if not names_effect(key)}
     name, method = str(rest.pop("scenario", _SCENARIO)), str(rest.pop("method", "smoother"))
     calibration = str(rest.pop("calibration", "none"))
-    if method not in RATE_METHODS:
-        raise unknown_name("method", method, RATE_METHODS)
-    if calibration not in _CALIBRATIONS:
-        raise unknown_name("calibration", calibration, _CALIBRATIONS)
+    check_name("method", method, RATE_METHODS)
+    check_name("calibration", calibration, _CALIBRATIONS)
     changes = [f"{_SHORT.get(key, key)}={as_toml(value)}" for key, value in rest.items()]
     scenario = Scenario.load(name, changes=changes)
     rng = np.random.default_rng([case.seed, 1])  # apart from the world's own chance

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.base.errors import unknown_name
+from gfimu.base.errors import check_name
 from sim.effects import make_effect
 from sim.trials.benchmark.baselines.sysid import identify
 from sim.trials.benchmark.library import Block, Candidate, LinearLibrary
@@ -30,8 +30,7 @@ _SEEN = 1e-6  # standard deviation as a share of the prior below which a coordin
 
 def run_baseline(method: str, case: Case, source: str = "") -> dict[str, Any]:
     """Draw a case and let a simpler method name its causes; the outcome has the form of `run_case`."""
-    if method not in METHODS:
-        raise unknown_name("method", method, METHODS)
+    check_name("method", method, METHODS)
     world = draw_world(case, source)
     wall, processor = time.perf_counter(), processor_time()
     causes = METHODS[method](world)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from gfimu.base.errors import InputError, unknown_name
+from gfimu.base.errors import InputError, check_name
 from sim.effects import BODY_EFFECTS, EFFECTS, NOT_OF_AN_ENCODER
 
 __all__ = ["BODY_PARTS", "EXOTICS", "STUDIES", "Case", "find_case", "study_cases"]
@@ -368,8 +368,7 @@ def study_cases(name: str, first: int | None = None) -> list[Case]:
     InputError
         If there is no such study.
     """
-    if name not in STUDIES:
-        raise unknown_name("study", name, STUDIES)
+    check_name("study", name, STUDIES)
     cases = STUDIES[name]()
     order = np.random.default_rng(len(cases)).permutation(len(cases))
     return [cases[place] for place in order[:first]]

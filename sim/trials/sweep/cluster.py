@@ -6,14 +6,13 @@ import asyncio
 import logging
 import pickle
 import time
-import warnings
 from collections.abc import Iterator
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from gfimu.base.errors import InputError, RecordingWarning
+from gfimu.base.errors import InputError, warn
 from gfimu.base.optional_packages import require
 from sim.trials.sweep.engine import Workers
 
@@ -123,7 +122,7 @@ def _client(address: str, remedy: str) -> Client:
     client = Client(address, timeout=_CONNECT, set_as_default=False)
     if not client.nthreads():
         text = f"--cluster {address}: has no workers yet, the campaign waits for them; {remedy}"
-        warnings.warn(text, RecordingWarning, stacklevel=2)
+        warn(text)
     return client
 
 

@@ -11,7 +11,7 @@ import pyarrow as pa
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from gfimu.base.errors import InputError, unknown_name
+from gfimu.base.errors import InputError, check_name
 from gfimu.base.files.atomic_file import write_text
 from gfimu.base.results import save_figure
 from gfimu.base.results.colours import INK, css
@@ -59,8 +59,7 @@ def campaign_picture(
     """
     there = result_names(table, design.plan)
     for name in results:
-        if name not in there:
-            raise unknown_name("result", name, there)
+        check_name("result", name, there)
     if not there:
         raise InputError(f"{folder}: has no results to draw yet; gfimu campaign status {folder} says how far it is")
     drawn = list(results) or there[:_MOST_RESULTS]

@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +18,10 @@ from gfimu.base.results import Panel, PlottedResult, Series, TableResult, one_ro
 from gfimu.base.units import duration_text
 from gfimu.recording.tables.arrow import as_found
 from sim.trials.sweep.dataset import Dataset
-from sim.trials.sweep.pace import Run
-from sim.trials.sweep.sensitivity import METHODS, Sensitivity
-from sim.trials.sweep.summary import Group
+from sim.trials.sweep.design import Design
+from sim.trials.sweep.pace import Run, runs
+from sim.trials.sweep.sensitivity import METHODS, Sensitivity, seed_shares, sensitivities
+from sim.trials.sweep.summary import Group, failures, grouped
 
 __all__ = ["CampaignPlot", "CampaignResult", "CampaignStatus", "CampaignTable"]
 
@@ -59,6 +60,13 @@ class CampaignResult(_Counts, PlottedResult):
     groups: Annotated[tuple[Group, ...], figure("Quantiles of each result by the values of the factors.")]
     ran: bool = False  # whether this call ran cases
 
+    @classmethod
+    def of(cls, dataset: Dataset, by: Sequence[str] = (), *, ran: bool = False) -> Self:
+        """Summarise a campaign by the values of factors, by default of all."""
+        table = dataset.table()
+        groups = tuple(grouped(table, dataset.plan, by))
+        return cls(dataset.folder, len(Design(dataset.plan)), len(table), failures(table), groups, ran)
+
     @property
     def every_case_failed(self) -> bool:
         """Whether no case has results."""
@@ -96,6 +104,13 @@ class CampaignStatus(_Counts, TableResult):
     """
 
     runs: Annotated[tuple[Run, ...], figure("Processes that work at it now.")]
+
+    @classmethod
+    def of(cls, dataset: Dataset) -> Self:
+        """Return how far a campaign is."""
+        running = tuple(runs(dataset))  # first: a case that ends meanwhile is then one of those that are done
+        table = dataset.table(["failure"])
+        return cls(dataset.folder, len(Design(dataset.plan)), len(table), failures(table), running)
 
     @property
     def rate_per_s(self) -> Annotated[float, figure("Cases per second.", "1/s")]:
@@ -151,6 +166,13 @@ class CampaignTable(Declared, PlottedResult):
     seed_shares: Annotated[
         dict[str, float], figure("Share of the seeds in the variance of each result; empty without repeats.")
     ]
+
+    @classmethod
+    def of(cls, dataset: Dataset, by: Sequence[str] = ()) -> Self:
+        """Tabulate a campaign by the values of factors, by default of all."""
+        table, design = dataset.table(), Design(dataset.plan)
+        groups = tuple(grouped(table, dataset.plan, by))
+        return cls(groups, tuple(sensitivities(table, design)), seed_shares(table, design))
 
     def to_columns(self) -> dict[str, NDArray[Any]]:
         """Return one row per group and result: the factors' values, cases, quantiles 5, 50 and 95 %."""

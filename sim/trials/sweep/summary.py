@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.stats import binomtest
 
 from gfimu.base.declared import Declared, figure
-from gfimu.base.errors import unknown_name
+from gfimu.base.errors import check_name
 from sim.trials.sweep.plan import PlanFile, RangeTable, Value
 
 __all__ = ["Group", "failures", "grouped", "numbers", "result_names", "share_of", "varying"]
@@ -86,8 +86,7 @@ def grouped(table: pa.Table, plan: PlanFile, by: Sequence[str] = ()) -> list[Gro
         If the plan has no such factor.
     """
     for name in by:
-        if name not in plan.factors:
-            raise unknown_name("factor", name, plan.factors)
+        check_name("factor", name, plan.factors)
     names = list(by) or [name for name in varying(plan) if not isinstance(plan.factors[name], RangeTable)]
     if not len(table):
         return []

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from gfimu.base.errors import InputError, unknown_name
+from gfimu.base.errors import InputError, check_name
 from gfimu.base.files.input_file import as_path, first_bytes
 from gfimu.base.plugins import plugins
 from gfimu.recording.importing.column_map import TextSpec
@@ -109,8 +109,7 @@ def read_foreign(path: str | Path, kind: str = "", text: TextSpec = TextSpec()) 
     found = format_of(file)
     name = kind or found
     known = readers()
-    if name not in known:
-        raise unknown_name("format", name, known)
+    check_name("format", name, known)
     if name != found and {name, found} != {"matlab", "hdf5"}:  # MATLAB 7.3 writes HDF5
         raise InputError(f"{file}: holds {found}, not {name}; give a map for {found}")
     return known[name].read(file, text)

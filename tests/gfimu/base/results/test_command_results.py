@@ -29,10 +29,10 @@ from firmware_bridge.strict.findings import Finding
 from gfimu import CampaignStatus, DemoResult
 from gfimu.base import homes_of
 from gfimu.base.results import PlottedResult, TableResult
-from gfimu.commands.benchmark_results import BenchmarkRun
 from gfimu.commands.demo_steps import Row
 from gfimu.recording import ReferenceSeries, join_reference
 from sim.trials.benchmark.judged import Judged
+from sim.trials.benchmark.results import BenchmarkRun
 from sim.trials.benchmark.table import Judgement
 from sim.trials.sweep.pace import Run
 
