@@ -20,9 +20,10 @@ if TYPE_CHECKING:
     from gfimu.calibration.error_model import ErrorModel, free_elements
     from gfimu.calibration.imu_tk import read_text_triad
     from gfimu.calibration.known_poses import levelling_covariance
+    from gfimu.calibration.method import CalibrationTask, run_calibration
     from gfimu.calibration.multi_position import multi_position_gyro
     from gfimu.calibration.observations import Observations, averaged_poses, every_sample
-    from gfimu.calibration.registry import METHODS
+    from gfimu.calibration.registry import METHODS, calibration_method
     from gfimu.calibration.run_file import open_uncalibrated
     from gfimu.calibration.spin import SpinPolicy
 else:

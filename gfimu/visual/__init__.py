@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from gfimu.base.lazy_names import declared_names
 
 if TYPE_CHECKING:
+    from gfimu.visual.colours import PAGE
     from gfimu.visual.comparison import write_comparison
     from gfimu.visual.motion import ExpectedDrift, KnownMotion
     from gfimu.visual.page import STILL_POLICY, page_plots, page_style
@@ -19,5 +20,5 @@ if TYPE_CHECKING:
     from gfimu.visual.scene import Body, Box, Cylinder, Mesh, Names, Path, Pointers, Scene, SensingArrows
 else:
     __getattr__, __dir__, __all__ = declared_names(
-        __name__, needs=("a rerun recording", "rerun"), without=("ExpectedDrift", "KnownMotion")
+        __name__, needs=("a rerun recording", "rerun"), without=("PAGE", "ExpectedDrift", "KnownMotion")
     )

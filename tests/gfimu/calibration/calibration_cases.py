@@ -4,9 +4,7 @@ import itertools
 
 import numpy as np
 
-from gfimu.calibration import ErrorModel, Observations
-from gfimu.calibration.method import CalibrationTask, run_calibration
-from gfimu.calibration.registry import calibration_method
+from gfimu.calibration import CalibrationTask, ErrorModel, Observations, calibration_method, run_calibration
 
 GRAVITY = 9.81
 FACES = np.concatenate([np.eye(3), -np.eye(3)])

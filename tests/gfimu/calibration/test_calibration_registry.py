@@ -10,10 +10,9 @@ from every_item import every
 from recordings import pose_recording
 
 from gfimu import InputError
-from gfimu.calibration import METHODS
+from gfimu.calibration import METHODS, CalibrationTask, calibration_method, run_calibration
 from gfimu.calibration.error_model import GAUGES
-from gfimu.calibration.method import CalibrationTask, run_calibration
-from gfimu.calibration.registry import CalibrationMethod, calibration_method
+from gfimu.calibration.registry import CalibrationMethod
 
 
 @every("method", METHODS.values())

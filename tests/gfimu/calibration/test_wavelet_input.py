@@ -7,8 +7,7 @@ from calibration_cases import GRAVITY, MULTI
 from recordings import pose_recording
 
 from gfimu import InputError, Recording
-from gfimu.calibration import METHODS, every_sample
-from gfimu.calibration.method import CalibrationTask, run_calibration
+from gfimu.calibration import METHODS, CalibrationTask, every_sample, run_calibration
 from gfimu.calibration.observations import THRESHOLDS, denoised_samples, observations_from
 from gfimu.recording.rest import Rest
 

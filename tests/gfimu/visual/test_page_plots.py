@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from gfimu.base import chip_colour
-from gfimu.visual import Packed, page_plots
-from gfimu.visual.colours import PAGE, TONES
+from gfimu.visual import PAGE, Packed, page_plots
+from gfimu.visual.colours import TONES
 from gfimu.visual.page import enveloped
 
 

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import gfimu
 from gfimu.base import chip_colour, css
-from gfimu.visual import STILL_POLICY, Packed, page_plots, page_style
-from gfimu.visual.colours import PAGE
+from gfimu.visual import PAGE, STILL_POLICY, Packed, page_plots, page_style
 
 
 def test_every_colour_that_a_rule_names_is_defined_by_day_and_by_night():

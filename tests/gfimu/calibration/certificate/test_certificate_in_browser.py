@@ -11,7 +11,7 @@ from certification_cases import calibration_of, random_covariance, random_model
 from headless_browser import headless_browser
 
 from gfimu.calibration import certificate_html, certify
-from gfimu.visual.colours import PAGE
+from gfimu.visual import PAGE
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ from made_diagnoses import made_diagnosis
 
 from gfimu.base import chip_colour
 from gfimu.diagnosis import report_html
-from gfimu.visual.colours import PAGE
+from gfimu.visual import PAGE
 
 READY = "document.documentElement.dataset.ready === 'true'"
 PLOT = "document.querySelector('[data-plot=residual]')"

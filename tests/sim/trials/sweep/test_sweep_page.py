@@ -9,7 +9,7 @@ import pyarrow as pa
 import pytest
 from headless_browser import headless_browser
 
-from gfimu.visual.colours import PAGE
+from gfimu.visual import PAGE
 from sim.trials import Design, campaign_picture, load_plan
 
 PLAN = """
