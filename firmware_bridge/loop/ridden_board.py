@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Self
 
 from firmware_bridge.board.trace import Event
 from firmware_bridge.frames.commands import sample_at, set_range
 from firmware_bridge.loop.board_process import BoardProcess
-from firmware_bridge.loop.physics import RidePhysics
+from firmware_bridge.loop.physics import RidePhysics, Scene
 from firmware_bridge.loop.virtual_port import ServeReport, open_port, serve
 from firmware_bridge.loop.virtual_run import typical_chips
 from gfimu.base.files.model_files import list_models
-from sim.ride import Ride
 
 __all__ = ["RiddenBoard"]
 
@@ -27,22 +25,17 @@ class RiddenBoard:
 
     Parameters
     ----------
-    ride : Ride
-        What the board experiences.
+    ride : Scene
+        What the board experiences (`sim.ride.Ride`).
     image : str or Path
         Firmware.
     fast : bool, optional
         Whether the peripherals run in C; by default where possible.
     """
 
-    ride: Ride
+    ride: Scene
     image: str | Path = "gfimu"
     fast: bool | None = None
-
-    @classmethod
-    def of(cls, scenario: str | Path, *, seed: int, image: str | Path, pure_python: bool) -> Self:
-        """Return the board that rides a scenario, given by name or file."""
-        return cls(Ride(scenario, seed=seed), image, False if pure_python else None)
 
     def power(self, *, trace: bool = False) -> BoardProcess:
         """Power the board, whose chips have clocks of their own (`typical_chips`)."""

@@ -149,12 +149,14 @@ def run(
         raise InputError(_EITHER)
     from firmware_bridge.loop.ridden_board import RiddenBoard
     from firmware_bridge.loop.virtual_run import record_virtual
+    from sim.ride import Ride
 
-    ridden = RiddenBoard.of(scenario, seed=seed, image=image, pure_python=pure_python)
+    ride = Ride(scenario, seed=seed)
+    ridden = RiddenBoard(ride, image, False if pure_python else None)
     if port is not None:
         return ridden.serve(port, duration, rate_hz=rate, range_g=range_g, realtime=realtime, on_open=on_open)
     result = record_virtual(
-        ridden.ride, duration or ridden.ride.duration, rate_hz=rate, range_g=range_g, image=image,
+        ride, duration or ride.duration, rate_hz=rate, range_g=range_g, image=image,
         fast=ridden.fast, progress=progress,
     )  # fmt: skip
     if out is None:
@@ -252,8 +254,9 @@ def trace(
     require("gfimu firmware trace", "unicorn", "mujoco")
     from firmware_bridge.board.trace import write_trace
     from firmware_bridge.loop.ridden_board import RiddenBoard
+    from sim.ride import Ride
 
-    ridden = RiddenBoard.of(scenario, seed=seed, image=image, pure_python=True)
+    ridden = RiddenBoard(Ride(scenario, seed=seed), image, fast=False)
     return write_trace(out, ridden.traced(duration, skip_s=skip, rate_hz=rate))
 
 
