@@ -20,7 +20,6 @@ from firmware_bridge.host.stream_meter import GroupMeans, StreamMeter
 from gfimu.array.array import AccelerometerArray
 from gfimu.base.errors import GfimuError
 from gfimu.base.files.rerun_stream import rrd_stream
-from gfimu.visual.viewer import viewer_listens, viewer_stream
 
 if TYPE_CHECKING:  # imported by the view's own thread: that takes longer than a recording should wait
     from gfimu.rate.health.fault import ChannelFault
@@ -48,6 +47,18 @@ class StreamDrawing(Protocol):
 
     def add(self, block: LiveBlock) -> None:
         """Draw what came."""
+        ...
+
+
+class Viewer(Protocol):
+    """Shows a rerun stream on this machine (`gfimu.visual.viewer`)."""
+
+    def viewer_stream(self, application: str) -> Any:
+        """Return a stream to the viewer; one is started unless it is there."""
+        ...
+
+    def viewer_listens(self) -> bool:
+        """Whether the viewer is still there."""
         ...
 
 
@@ -82,8 +93,8 @@ class LiveView:
         Draws what comes, for a file or a viewer.
     rrd : Path, optional
         Write the picture as a rerun recording when the view is closed.
-    viewer : bool
-        Show the picture in the rerun viewer, which listens to this machine only; one is started unless it is there.
+    viewer : Viewer, optional
+        Shows the picture while it is drawn.
 
     Raises
     ------
@@ -101,7 +112,7 @@ class LiveView:
         on_note: Callable[[str], None] | None = None,
         picture: StreamPicture | None = None,
         rrd: Path | None = None,
-        viewer: bool = False,
+        viewer: Viewer | None = None,
     ) -> None:
         self._array, self._lsb = array, lsb
         self._on_text, self._on_fault, self._on_note = on_text, on_fault, on_note
@@ -115,10 +126,11 @@ class LiveView:
         self.omega = np.full(3, np.nan)
         self._open = ExitStack()
         self._sinks: list[_Sink] = []
-        self._viewer: Any = None
-        if viewer and picture is not None:
-            self._viewer = viewer_stream(_APPLICATION)
-            self._sinks.append(_Sink(picture.open(self._viewer), _LOOK_EVERY_S))
+        self._viewer = viewer
+        self._shown: Any = None  # its stream, while it is there
+        if viewer is not None and picture is not None:
+            self._shown = viewer.viewer_stream(_APPLICATION)
+            self._sinks.append(_Sink(picture.open(self._shown), _LOOK_EVERY_S))
         if rrd is not None and picture is not None:
             stream = self._open.enter_context(rrd_stream(rrd, _APPLICATION))
             self._sinks.append(_Sink(picture.open(stream), _FILE_EVERY_S))
@@ -230,11 +242,11 @@ class LiveView:
     def _look_for_viewer(self) -> None:
         """Go on without a viewer that was closed."""
         now = time.monotonic()
-        if self._viewer is None or now - self._viewer_seen_at < _VIEWER_EVERY_S:
+        if self._viewer is None or self._shown is None or now - self._viewer_seen_at < _VIEWER_EVERY_S:
             return
         self._viewer_seen_at = now
-        if not viewer_listens():
-            self._viewer = None
+        if not self._viewer.viewer_listens():
+            self._shown = None
             del self._sinks[0]
             self._note("the viewer was closed; the recording goes on")
 
@@ -282,7 +294,7 @@ class LiveView:
         if keep:
             if self._ended and self._on_fault is not None:
                 self._on_fault(self._ended)
-            _flush(self._viewer)
+            _flush(self._shown)
             self._open.close()
         else:
             self._open.pop_all()

@@ -100,6 +100,7 @@ def record(
     from firmware_bridge.host.recorder import record as record_port
     from firmware_bridge.sources.ports import has_own_samples, port_format
     from gfimu.array.array import AccelerometerArray
+    from gfimu.visual import viewer
 
     board, callbacks = board or BoardSettings(), callbacks or RecordCallbacks()
     if (find or self_test) and has_own_samples(port):
@@ -144,7 +145,7 @@ def record(
         if array is not None:
             view = LiveView(
                 array, form.count_size(array), on_text=callbacks.on_text, on_fault=callbacks.on_fault,
-                on_note=callbacks.on_note, rrd=None if rrd is None else Path(rrd), viewer=live,
+                on_note=callbacks.on_note, rrd=None if rrd is None else Path(rrd), viewer=viewer if live else None,
                 picture=_picture(array) if has_picture else None,
             )  # fmt: skip
         elif has_picture:
@@ -157,9 +158,7 @@ def record(
 
     if live:
         require("--live", "rerun")
-        from gfimu.visual.viewer import check_display
-
-        check_display()
+        viewer.check_display()
     if board.array or not form.array_is_assumed:  # before the port is opened: a viewer takes a while
         settle(AccelerometerArray.load(board.array or form.array))
     keep = False

@@ -218,7 +218,11 @@ def test_every_module_of_the_diagnosis_has_a_test_that_imports_it():
     tests = (ROOT / "tests" / "gfimu" / "diagnosis").rglob("test_*.py")
     trees = [ast.parse(file.read_text(encoding="utf-8")) for file in tests]
     faces = ("gfimu", "gfimu.diagnosis")
-    homes = {f"{face}.{name}": home for face in faces for name, home in homes_of(face).items()}
+    homes = {
+        f"{face}.{name}": home
+        for face in faces
+        for name, home in homes_of(importlib.import_module(face).__name__).items()
+    }
     by_face = {homes[name] for tree in trees for name in imported_names(tree, by_types=False) if name in homes}
     imported = by_face.union(*map(imports, trees))
     rooms = [f"gfimu.diagnosis.{room}" for room in DIAGNOSIS]

@@ -51,28 +51,33 @@ class Picture:
 
 @pytest.fixture
 def viewer(monkeypatch):
-    """A viewer that is there until ``viewer.clear()``."""
-    there = threading.Event()
-    there.set()
+    """A viewer that is there until ``viewer.closed`` is set."""
 
     class Closed:
         def flush(self, timeout_sec):
             raise RuntimeError
 
-    monkeypatch.setattr(live, "viewer_stream", lambda _: Closed())
-    monkeypatch.setattr(live, "viewer_listens", there.is_set)
+    class Viewer:
+        closed = threading.Event()
+
+        def viewer_stream(self, _application):
+            return Closed()
+
+        def viewer_listens(self):
+            return not self.closed.is_set()
+
     monkeypatch.setattr(live, "_VIEWER_EVERY_S", 0.0)
-    return there
+    return Viewer()
 
 
 def test_a_viewer_that_is_closed_is_one_sentence_and_the_file_goes_on(viewer, tmp_path):
     notes, picture = [], Picture()
-    view = LiveView(CUBE, 1.0, on_note=notes.append, rrd=tmp_path / "x.rrd", viewer=True, picture=picture)
+    view = LiveView(CUBE, 1.0, on_note=notes.append, rrd=tmp_path / "x.rrd", viewer=viewer, picture=picture)
     parts = list(batches(*rest(200, 100.0), 10))
     for batch in parts[:10]:
         view(batch, COUNTS)
     time.sleep(3 * live._LOOK_EVERY_S)
-    viewer.clear()
+    viewer.closed.set()
     for batch in parts[10:]:
         view(batch, COUNTS)
         time.sleep(0.02)
@@ -86,7 +91,7 @@ def test_a_viewer_that_is_closed_is_one_sentence_and_the_file_goes_on(viewer, tm
 def test_what_is_shown_is_what_the_filter_gives(viewer):
     picture = Picture()
     t, readings = rest(300, 100.0)
-    view = LiveView(CUBE, 1.0, viewer=True, picture=picture)
+    view = LiveView(CUBE, 1.0, viewer=viewer, picture=picture)
     for batch in batches(t, readings, 7):
         view(batch, COUNTS)
     view.close()
@@ -113,7 +118,7 @@ def test_a_recording_does_not_wait_for_the_compiler(viewer, monkeypatch):
     monkeypatch.setattr(live, "_TEXT_EVERY_S", 0.0)
     notes, texts, picture = [], [], Picture()
     t, readings = rest(300, 100.0)
-    view = LiveView(CUBE, 1.0, on_note=notes.append, on_text=texts.append, viewer=True, picture=picture)
+    view = LiveView(CUBE, 1.0, on_note=notes.append, on_text=texts.append, viewer=viewer, picture=picture)
     began = time.monotonic()
     for batch in batches(t, readings, 10):
         view(batch, COUNTS)
@@ -138,7 +143,7 @@ def test_a_full_disk_under_the_filter_ends_the_view_and_not_the_recording(viewer
 
     monkeypatch.setattr(background.WatchedRateFilter, "push", fails)
     said = []
-    view = LiveView(CUBE, 1.0, on_fault=said.append, viewer=True, picture=Picture())
+    view = LiveView(CUBE, 1.0, on_fault=said.append, viewer=viewer, picture=Picture())
     for batch in batches(*rest(300, 100.0), 10):
         view(batch, COUNTS)
         time.sleep(0.02)

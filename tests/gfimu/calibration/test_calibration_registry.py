@@ -60,8 +60,8 @@ def counted(observations, *, gravity, gauge):
 def test_a_new_method_is_one_record(triad):
     record = CalibrationMethod(
         "counted",
-        f"{__name__}:counted",
-        METHODS["six-position"].runner,
+        counted,
+        METHODS["six-position"].run,
         needs="six faces, level",
         estimates="M and b of each chip",
         source="none",
