@@ -24,7 +24,8 @@ FILE_KINDS = {
     "plan": "sim.trials.sweep.plan.PlanFile",
     "brief": "gfimu.array_search.brief.BriefFile",
 }
-"""Kinds of files by name, and the struct that is the schema of each."""
+"""Kinds of files by name, and where the struct stands that is the schema of each: one kind must not wait for MuJoCo,
+which another one takes and a light installation lacks."""
 
 
 def file_schema(kind: str) -> type[msgspec.Struct]:

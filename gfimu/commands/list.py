@@ -9,7 +9,7 @@ gfimu list scenarios --json
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Literal, get_args
 
 from gfimu.base.declared import Table
 from gfimu.commands.shell.declare import Option, command
@@ -36,11 +36,7 @@ class _Listing:
         yield Table(self.kind, ("name", "what it is"), list(self.names.items()), left=2)
 
 
-def _report(names: dict[str, str], given: Any) -> _Listing:
-    return _Listing(given["kind"], names)
-
-
-@command("list", report=_report, results=lambda: (dict[str, str],))
+@command("list", report=lambda names, given: _Listing(given["kind"], names), results=lambda: (dict[str, str],))
 def catalogue(
     kind: Annotated[_Kind, Option(f"What to list: {', '.join(KINDS)}.", "KIND", argument=True)],
 ) -> dict[str, str]:

@@ -14,7 +14,7 @@ gfimu show my_twin.toml
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from gfimu.base.declared import Declared, FileText, figure
 from gfimu.base.errors import InputError, unknown_name
@@ -47,11 +47,7 @@ class Shown(Declared):
         yield FileText(self.text)
 
 
-def _report(text: str, given: Any) -> Shown:
-    return Shown(given["name"], text)
-
-
-@command(report=_report, results=lambda: (Shown,))
+@command(report=lambda text, given: Shown(given["name"], text), results=lambda: (Shown,))
 def show(name: Annotated[str, _NAME], *, max_memory: Annotated["MemorySize | None", MAX_MEMORY] = None) -> str:
     """Return the text of a shipped file, of a file of your own, of the array in a recording, or of an effect.
 
