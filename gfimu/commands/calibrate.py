@@ -55,7 +55,7 @@ _METHOD = Option(f"Method: {', '.join(_METHODS)}.", "METHOD", offers=completion.
 _OUT = Option("Calibration to write (.json).", writes=CALIBRATION, what="calibration", needed=True)
 _PARAMETERS = Option("Per chip: 12 (full matrix) or 9 (triangular).")
 _MOTION = Option("array: recording of the motion, or of shakes (may be RUN).", kind=Path, reads=True)
-_CHECK = Option("Other poses at rest, which the fit does not see: length of a less g there.", kind=Path, reads=True)
+_CHECK = Option("Other poses at rest, which the fit does not see: norm of a minus g on them.", kind=Path, reads=True)
 _PROGRESS = Option("Called with the share done of a fit to shakes, 0 to 1.", shell=False)
 
 
