@@ -106,7 +106,7 @@ class Key:
 
 
 figure = Key
-"""How a result writes it."""
+"""The name by which results declare a key, because it reads as what it describes: ``Annotated[float, figure(…)]``."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What an array that can't see all six motions gives nevertheless, and how well, in words."""
+"""Which motions an array of rank below six determines, with their standard deviations, as text for messages."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ SWAP_Z = ("axis_swap", {"channels": ["a13", "a21"]})
 @pytest.mark.parametrize(
     "faults",
     [
-        [("sign_flip", {"channel": "a13"})],  # every other z channel reads the same: no exchange need be told
+        [("sign_flip", {"channel": "a13"})],  # every other z channel reads the same: no exchange need be flagged
         [("axis_swap", {"channels": ["a11", "a12"]})],
         [SWAP_Z, ("sign_flip", {"channel": "a21"})],
         [("axis_swap", {"channels": ["a11", "a12"]}), ("sign_flip", {"channel": "a12"})],
@@ -188,15 +188,15 @@ def test_a_channel_in_the_middle_of_a_coarse_step_is_not_frozen():
     t = run.t[:, None]
     # Most readings differ from the one before, but not at rest.
     moving = 300.0 * step * np.maximum(np.sin(0.5 * t), 0.0) ** 2 + rng.uniform(-step, step, 12)
-    longest, told = 0, 0
+    longest, flagged = 0, 0
     for _ in range(30):
         readings = np.round((moving + noise * rng.standard_normal(moving.shape)) / step) * step
         for column in readings.T:
             changed = np.flatnonzero(np.diff(column) != 0.0)
             longest = max(longest, int(np.diff(changed).max()))
-        told += len(frozen_stretches(replace(run, readings=readings), moving, step, noise))
+        flagged += len(frozen_stretches(replace(run, readings=readings), moving, step, noise))
     assert longest > 40
-    assert told == 0
+    assert flagged == 0
     readings[800:950, 7] = readings[800, 7]
     ((channel, start, stop),) = frozen_stretches(replace(run, readings=readings), moving, step, noise)
     assert (channel, start) == (7, pytest.approx(800, abs=5))
