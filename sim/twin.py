@@ -22,7 +22,16 @@ from gfimu.base.files.model_files import find_model, read_toml
 from gfimu.base.files.schema import read
 from gfimu.base.short_repr import short_repr
 from gfimu.base.units import STANDARD_GRAVITY
-from gfimu.model.world_model import BasisUnits, BodyModel, EffectFamily, ExpectedNoise, Spin, is_linear, reads_place
+from gfimu.model.world_model import (
+    BasisUnits,
+    BodyModel,
+    EffectFamily,
+    ExpectedNoise,
+    PlacedArray,
+    Spin,
+    is_linear,
+    reads_place,
+)
 from gfimu.model.world_model import Effect as AnyEffect
 from gfimu.motion.body_drive import BodyDrive
 from sim import forward
@@ -230,6 +239,11 @@ class Twin:
     def local_gravity(self) -> float:
         """Magnitude of the specific force at rest, m/s²."""
         return self.gravity
+
+    def placed(self, mounting: NDArray[np.float64] | None = None) -> PlacedArray:
+        """Return the array as it stands on the table, turned by a rotation vector from upright."""
+        _, geometry = self._placed((), mounting, None)
+        return PlacedArray(geometry.axes, geometry.places, self.gravity * geometry.up)
 
     def families(self) -> Mapping[str, type[Effect]]:
         """Return the library of effects: of a table with its kind of reference, a linear axis, or a free body."""

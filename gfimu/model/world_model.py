@@ -24,6 +24,7 @@ __all__ = [
     "EffectFamily",
     "ExpectedNoise",
     "Pattern",
+    "PlacedArray",
     "Size",
     "Spin",
     "SpinState",
@@ -266,6 +267,25 @@ class ExpectedNoise:
 
 
 @dataclass(frozen=True)
+class PlacedArray:
+    """An array on the table of a rig, in the frame that turns with the table, its z along the axis.
+
+    Parameters
+    ----------
+    axes : ndarray, shape (c, 3)
+        Sensing axes, unit vectors.
+    places : ndarray, shape (c, 3)
+        Places of the chips from a point of the axis, m.
+    gravity : ndarray, shape (3,)
+        Specific force of a rig at rest, m/s², at the angle zero.
+    """
+
+    axes: NDArray[np.float64]
+    places: NDArray[np.float64]
+    gravity: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
 class BasisUnits:
     """What rate (rad/s), acceleration (rad/s²) and time (s) are divided by in a generic basis; all positive."""
 
@@ -340,6 +360,10 @@ class WorldModel(Protocol):
         start: float | None = None,
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Predict noise-free channels (n, c), m/s², and the reference (n,) for a spin, with more effects added."""
+        ...
+
+    def placed(self, mounting: NDArray[np.float64] | None = None) -> PlacedArray | None:
+        """Return the array as it stands on the table, turned by a rotation vector from upright; None if not known."""
         ...
 
     def sample_times(self, t: NDArray[np.float64], effects: Sequence[Effect] = ()) -> NDArray[np.float64]:

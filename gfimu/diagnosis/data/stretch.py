@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
 from gfimu.base.errors import GfimuError
+from gfimu.diagnosis.data.added import RigState, split
 from gfimu.diagnosis.data.cosine_basis import CosineBasis, NoiseLevels
 from gfimu.diagnosis.data.reference import difference_noise
 from gfimu.diagnosis.data.rounding import COARSE, NO_STEPS, Steps
@@ -213,15 +214,34 @@ class Stretch:
     def _predict(
         self, effects: Sequence[Effect], drive: Spin, t: NDArray[np.float64], temperature: NDArray[np.float64] | None
     ) -> NDArray[np.float64]:
+        own, added = split(effects)
+        motion = self.motion(own, drive)
         channels, reference = self.model.predict(
-            self.motion(effects, drive),
-            t,
-            effects=effects,
-            temperature=temperature,
-            mounting=self.run.mounting,
-            start=self.start,
+            motion, t, effects=own, temperature=temperature, mounting=self.run.mounting, start=self.start
         )
-        return np.column_stack([channels, reference])
+        predicted = np.column_stack([channels, reference])
+        if added:
+            state = self._state(motion, t, channels, temperature)
+            predicted += np.sum([effect.added(state) for effect in added], axis=0)
+        return predicted
+
+    def state(self, effects: Sequence[Effect], drive: Spin) -> RigState:
+        """Return what the rig does at the samples, as the simulation has it with some effects of its own."""
+        own, _ = split(effects)
+        motion = self.motion(own, drive)
+        return self._state(motion, self.run.t, self.predict(own, drive)[:, :-1], self.run.temperature)
+
+    def _state(
+        self,
+        motion: Spin,
+        t: NDArray[np.float64],
+        readings: NDArray[np.float64],
+        temperature: NDArray[np.float64] | None,
+    ) -> RigState:
+        placed = self.model.placed(self.run.mounting)
+        if placed is None:
+            raise NoPredictionError("the simulation does not say how its array stands")
+        return RigState(t - self.start, motion.at(t), readings, temperature, self.run.sample_period, placed)
 
     def motion(self, effects: Sequence[Effect], drive: Spin) -> Spin:
         """Return the table's motion for a drive under effects.
@@ -234,13 +254,14 @@ class Stretch:
 
     def gain(self, effects: Sequence[Effect]) -> float:
         """Return what the reference reads of the motion under effects, kept away from zero."""
-        gain = self.model.reference_gain(effects)
+        gain = self.model.reference_gain(split(effects)[0])
         return float(np.copysign(max(abs(gain), _LEAST_GAIN), gain))
 
     def times(self, effects: Sequence[Effect] = ()) -> NDArray[np.float64]:
         """Return all true times that readings belong to, s."""
         # The clocks agree when the run begins, whatever the board's shows then.
-        times = self.start + self.model.sample_times(self.run.t - self.start, [*self.known, *effects])
+        own, _ = split([*self.known, *effects])
+        times = self.start + self.model.sample_times(self.run.t - self.start, own)
         if self.run.late is not None:
             times[:, -1] += self.run.late
         if self.run.conversions is not None:

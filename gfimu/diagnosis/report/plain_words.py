@@ -67,14 +67,8 @@ def headline(diagnosis: Diagnosis) -> str:
             return "No single thing is wrong: the simulation's numbers are all a little off, as after a calibration."
         case "nothing_found":
             return "Nothing is wrong with the simulation that this recording could show."
-        case "unknown" if diagnosis.interrupted:
-            return diagnosis.sentences[0]
-        case "unknown" if diagnosis.unexplained.mistake:
-            return f"The files do not fit these data: {diagnosis.unexplained.mistake}."
-        case "unknown" if found:
-            return f"Found: {_joined(found)}. Something else is real too, and nothing in the library explains it."
         case "unknown":
-            return "Something real is missing in the simulation, and nothing in the library explains it."
+            return _of_unknown(diagnosis, found)
         case "ambiguous":
             contested = [cause for cause in diagnosis.causes if cause.not_distinguishable_from] or diagnosis.causes
             names = dict.fromkeys(name for one in contested for name in (one.effect, *one.not_distinguishable_from))
@@ -90,6 +84,21 @@ def headline(diagnosis: Diagnosis) -> str:
             return f"Found what the simulation leaves out: {found[0]}."
         case _:
             return f"Found {_count(len(found))} things that the simulation leaves out: {_joined(found)}."
+
+
+def _of_unknown(diagnosis: Diagnosis, found: list[str]) -> str:
+    """Return the headline of an unknown verdict, given the causes that were found beside it in words."""
+    unexplained = diagnosis.unexplained
+    if diagnosis.interrupted:
+        return diagnosis.sentences[0]
+    if unexplained.mistake:
+        return f"The files do not fit these data: {unexplained.mistake}."
+    if unexplained.located:
+        text = f"is wrong that has no name in the library: {unexplained.located[0].text}."
+        return f"Found: {_joined(found)}. Something else {text}" if found else f"Something {text}"
+    if found:
+        return f"Found: {_joined(found)}. Something else is real too, and nothing in the library explains it."
+    return "Something real is missing in the simulation, and nothing in the library explains it."
 
 
 def summary(diagnosis: Diagnosis, cause: NamedCause) -> str:
@@ -292,7 +301,9 @@ def _by_verdict(diagnosis: Diagnosis) -> list[str]:
         case "unknown" if diagnosis.interrupted:
             return ["Run it again with more time (--time-limit), or on a part of the recording."]
         case "unknown":
+            located = "; ".join(one.text for one in diagnosis.unexplained.located)
             place = "" if diagnosis.rigid is None else diagnosis.rigid.sentence
+            place = f"Look where it was located: {located}." if located else place
             steps = [place or "Look at the residual views of the report for where the discrepancy sits."]
             if diagnosis.unexplained.mistake:
                 steps = [f"Check the files: {diagnosis.unexplained.mistake}."]

@@ -66,6 +66,14 @@ class Columns:
         parts = tuple(part * by[at] for at, part in zip(self.places, self.parts, strict=True))
         return Columns(self.count, self.places, parts)
 
+    def mixed(self, mixing: NDArray[np.float64]) -> Columns:
+        """Return the columns of other unknowns, of which these (P,) are mixtures (P, k)."""
+        places = tuple(np.flatnonzero(mixing[at].any(axis=0)) for at in self.places)
+        parts = tuple(
+            part @ mixing[np.ix_(at, to)] for at, to, part in zip(self.places, places, self.parts, strict=True)
+        )
+        return Columns(mixing.shape[1], places, parts)
+
     def among(self, numbers: NDArray[np.intp], count: int) -> Columns:
         """Return the columns as those with these numbers (P,) of a larger set."""
         return Columns(count, tuple(numbers[at] for at in self.places), self.parts)

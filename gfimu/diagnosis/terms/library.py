@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from gfimu.diagnosis.data.stretch import NoPredictionError, Stretch
 from gfimu.diagnosis.terms.cause import Cause, effects_of
 from gfimu.diagnosis.terms.columns import Columns
+from gfimu.diagnosis.terms.located.term import LocatedTerm, located_columns
 from gfimu.diagnosis.terms.reach import behind_wiring, disjoint
 from gfimu.model.world_model import Effect, EffectFamily
 
@@ -76,6 +77,10 @@ def cause_columns(stretch: Stretch, seen: Seen, drive: Nuisance, causes: Sequenc
     present = effects_of(causes, array, stretch.index)
     found = [Columns.none(len(seen.weights), len(seen.prediction))]
     for number, cause in enumerate(causes):
+        if isinstance(cause.family, LocatedTerm):
+            state = stretch.state(present, drive.spin)
+            found.append(located_columns(cause.family, state, seen.weight).mixed(cause.mixing))
+            continue
         count = len(cause.coordinates)
         step = _step(cause, stretch)
 

@@ -14,7 +14,9 @@ from gfimu.diagnosis.criticism.views.run_view import RunView
 from gfimu.diagnosis.policy import Policy
 
 __all__ = [
+    "FunctionTable",
     "Interrupted",
+    "Located",
     "NamedCause",
     "NoiseLevels",
     "ReferenceClock",
@@ -147,6 +149,41 @@ class Residual(Declared):
 
 
 @dataclass(frozen=True)
+class FunctionTable(Declared):
+    """An unknown function as a table, with its standard deviation."""
+
+    x: Annotated[tuple[float, ...], figure("Values of what it is a function of.")]
+    f: Annotated[tuple[float, ...], figure("The function there; of several components the largest one.")]
+    std: Annotated[tuple[float, ...], figure("Standard deviations of the function.")]
+    x_unit: Annotated[str, figure("Unit of x.")]
+    unit: Annotated[str, figure("Unit of f; 1 of a ratio.")]
+
+
+@dataclass(frozen=True)
+class Located(Declared):
+    """Something that has no name: where it is and what it goes with."""
+
+    place: Annotated[
+        str,
+        figure("Where in the chain it acts: reference, motion, clock, array, bench, supply, chip or channel."),
+    ]
+    what: Annotated[str, figure("What changes there, such as leans or offset.")]
+    pattern: Annotated[str, figure("Which series share it: one channel, a chip, each its own, or all.")]
+    series: Annotated[tuple[str, ...], figure("Axes, channels or chips that it is of.")]
+    dependence: Annotated[str, figure("What it goes with, such as omega^3; time where nothing else serves.")]
+    text: Annotated[str, figure("The same in words, with its size.")]
+    place_probability: Annotated[float, figure("Probability of the place.")]
+    log_odds: Annotated[float, figure("Log odds against the best description without it.", "nats")]
+    instead: Annotated[tuple[str, ...], figure("Descriptions that these data can't separate from it.")] = ()
+    function: Annotated[FunctionTable | None, figure("The function; null where it is not of one quantity.")] = None
+
+    @property
+    def effect(self) -> Annotated[str, figure("The word of the contract for what has no name.", before="place")]:
+        """The word of the contract for what has no name."""
+        return "unlisted"
+
+
+@dataclass(frozen=True)
 class Unexplained(Declared):
     """What is left and nothing in the library explains."""
 
@@ -164,6 +201,10 @@ class Unexplained(Declared):
         int,
         figure("Terms that are not in it, as they are of absolute time, which another recording has otherwise."),
     ] = 0
+    located: Annotated[
+        tuple[Located, ...],
+        figure("Where it is and what it goes with, most important first; none where that was not found."),
+    ] = ()
     mistake: Annotated[str, figure("A mistake in the files that makes the simulation fit; empty where none does.")] = ""
 
 

@@ -99,6 +99,10 @@ class SimulatorModel:
         """Return what no cause explains as one more: a function of `gfimu.model.generic_basis` per channel."""
         return UnnamedCause(dependence, units, of_reference)
 
+    def placed(self, mounting: NDArray[np.float64] | None = None) -> None:
+        """Return None: only the simulation knows how its array stands."""
+        del mounting
+
     def predict(
         self,
         spin: Spin,

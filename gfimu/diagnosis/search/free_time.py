@@ -1,0 +1,109 @@
+"""Where something is wrong, without when: at each place the evidence of an error that is free in time.
+
+It needs no dependence, so that it finds the place of footsteps, of a floor that shakes, of a bias that jumps. The error
+is taken to be independent from block to block, in time or in frequency, with a variance of its own in each:
+½ n (v − 1 − ln v) nats for n samples of mean square v, less ½ ln n and a nat for having chosen v.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gfimu.diagnosis.data.stretch import Stretch
+from gfimu.diagnosis.fit.gauss_newton import FEW, Fit, fit
+from gfimu.diagnosis.fit.linear import Point, linearise
+from gfimu.diagnosis.policy import Policy
+from gfimu.diagnosis.terms.cause import effects_of
+from gfimu.diagnosis.terms.located.alternatives import channel_patterns, chip_groups
+from gfimu.diagnosis.terms.located.operators import Place, channel_place, rig_places
+from gfimu.model.world_model import reads_place
+
+__all__ = ["FreeTime", "free_time"]
+
+_Floats = NDArray[np.float64]
+_BLOCK_S, _BANDS = 0.5, 40  # numerical: blocks of time, and of frequency
+
+
+@dataclass(frozen=True)
+class FreeTime:
+    """A place with the evidence of an error there that is free in time.
+
+    Parameters
+    ----------
+    log_odds : float
+        Evidence against none, nats.
+    where : Place
+        The place.
+    pattern : str
+        Which series share the error.
+    """
+
+    log_odds: float
+    where: Place
+    pattern: str
+
+
+def free_time(stretches: Sequence[Stretch], fitted: Fit, policy: Policy) -> list[FreeTime]:
+    """Return the places of errors that are free in time beside the causes of a fit, best first.
+
+    The noise is the one to begin with, as learnt noise would take in what is looked for.
+    """
+    levels = tuple(stretch.first_levels for stretch in stretches)
+    point = fit(stretches, replace(fitted.point, levels=levels), replace(policy, steps=FEW)).point
+    totals: dict[str, FreeTime] = {}
+    for index, posterior in enumerate(linearise(stretches, point, responses=False).posteriors):
+        stretch = stretches[index]
+        weights = posterior.observed.weights
+        residual = posterior.whitened / np.sqrt(weights)
+        for where, pattern, directions in _directions(stretch, point, index):
+            value = sum(_gained(residual, one * np.sqrt(weights), stretch.run.sample_period) for one in directions)
+            label = f"{where.what} {where.components}"
+            before = totals[label].log_odds if label in totals else 0.0
+            totals[label] = FreeTime(before + value, where, pattern)
+    return sorted(totals.values(), key=lambda one: -one.log_odds)
+
+
+def _directions(stretch: Stretch, point: Point, index: int) -> Iterator[tuple[Place, str, list[_Floats]]]:
+    """Yield places with how an error of each component shows, (n, c + 1)."""
+    array = stretch.model.array
+    state = stretch.state(effects_of(point.causes, array, stretch.index), point.drives[index].spin)
+    places = rig_places(is_angle=reads_place(stretch.model))
+    for what in ("reads", "turns", "vibrates", "shakes", "gain"):
+        parts = [next(p for p in reversed(one.parts) if p is not None) for one in places[what].operators(state)]
+        yield places[what], "all", parts
+    kinds = [("offset", pattern) for pattern in channel_patterns(array)]
+    chips = zip(chip_groups(array), array.chips, strict=True)
+    kinds += [("delay", ("clock", "chip", (chip,), (one.name,))) for chip, one in chips]
+    for kind, (name, pattern, groups, labels) in kinds:
+        where = channel_place(name, kind, groups, labels)
+        yield (
+            where,
+            pattern,
+            [operator.of_value for operator in where.operators(state) if operator.of_value is not None],
+        )
+
+
+def _gained(residual: _Floats, direction: _Floats, period: float) -> float:
+    """Return the evidence of an error in one direction (n, c + 1), nats: the larger of blocks in time and frequency."""
+    size = np.linalg.norm(direction, axis=1)
+    if not size.max() > 0.0:
+        return 0.0
+    signal = np.sum(residual * direction, axis=1) / np.maximum(size, 1e-9 * size.max())
+    in_time = np.array_split(signal, max(int(len(signal) * period / _BLOCK_S), 1))
+    spectrum = np.fft.rfft(signal - signal.mean())[1:] / np.sqrt(len(signal))
+    in_frequency = np.array_split(np.abs(spectrum), min(_BANDS, len(spectrum)))
+    return max(_evidence(in_time, 0.5), _evidence(in_frequency, 1.0))
+
+
+def _evidence(blocks: Sequence[_Floats], share: float) -> float:
+    """Return Σ share · n (v − 1 − ln v) − ½ ln n − 1 over blocks whose mean square v is above one, nats."""
+    total = 0.0
+    for block in blocks:
+        power = max(float(np.mean(block**2)), 1.0)
+        gained = share * len(block) * (power - 1.0 - np.log(power)) - 0.5 * np.log(len(block)) - 1.0
+        total += max(float(gained), 0.0)
+    return total

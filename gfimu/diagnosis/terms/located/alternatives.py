@@ -1,0 +1,238 @@
+"""The located terms that a search compares: places times dependences, on the scales of what a rig did."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
+
+from gfimu.array.array import AccelerometerArray
+from gfimu.diagnosis.data.added import RigState
+from gfimu.diagnosis.terms.located.dependences import (
+    Dependence,
+    Form,
+    LowPassed,
+    Memory,
+    Mode,
+    OfReading,
+    Product,
+    Regressor,
+    Revolution,
+    curve_over,
+)
+from gfimu.diagnosis.terms.located.operators import channel_place, rig_places
+from gfimu.diagnosis.terms.located.term import LocatedTerm
+
+__all__ = ["ChannelTerms", "channel_patterns", "channel_terms", "chip_groups", "dependences", "rig_terms"]
+
+_Floats = NDArray[np.float64]
+ChannelPattern = tuple[str, str, tuple[tuple[int, ...], ...], tuple[str, ...]]
+"""Place of the contract, pattern, groups of channels that share an error, and names of the groups."""
+_MODES_HZ = np.geomspace(2.5, 40.0, 15)  # numerical: grid of the frequencies of modes
+_FASTEST = 0.4  # numerical: share of the sample rate up to which a mode is sampled
+_WARMED = 0.2  # K: by choice, of a temperature that changes at all
+
+RATE = Regressor("omega", "the rate", "rad/s", lambda state: state.spin.rate)
+ACCELERATION = Regressor("alpha", "the angular acceleration", "rad/s²", lambda state: state.spin.acceleration)
+ANGLE = Regressor("theta", "the angle turned", "rad", lambda state: state.spin.angle)
+TIME = Regressor("t", "time", "s", lambda state: state.t)
+_NOTHING = Regressor("1", "nothing", "", lambda state: np.ones_like(state.t))
+_SQUARE = Regressor("omega^2", "the rate squared", "rad²/s²", lambda state: state.spin.rate**2)
+_FORCES = tuple(
+    Regressor(f"the rotating force {axis}", "the force that turns with the table", "rad²/s²", force)
+    for axis, force in (
+        ("x", lambda s: s.spin.rate**2 * np.cos(s.spin.angle) + s.spin.acceleration * np.sin(s.spin.angle)),
+        ("y", lambda s: s.spin.rate**2 * np.sin(s.spin.angle) - s.spin.acceleration * np.cos(s.spin.angle)),
+    )
+)
+
+
+def _temperature(state: RigState) -> _Floats:
+    if state.temperature is None:
+        raise ValueError("the recording has no temperature")
+    return state.temperature
+
+
+TEMPERATURE = Regressor("T", "the temperature", "°C", _temperature)
+
+
+def _warming(state: RigState) -> _Floats:
+    """Return how fast the temperature changes over two seconds, K/s."""
+    smooth = uniform_filter1d(_temperature(state), max(int(2.0 / state.period), 3))
+    return np.asarray(np.gradient(smooth, state.period))
+
+
+_WARMING = Regressor("dT/dt", "the rate of change of the temperature", "K/s", _warming)
+
+
+def _largest(states: Sequence[RigState], regressor: Regressor) -> float:
+    return max(1e-9, *(float(np.abs(regressor.of(state)).max()) for state in states))
+
+
+def dependences(states: Sequence[RigState]) -> dict[str, Dependence]:
+    """Return all dependences but modes and waves, by name, on the scales of what rigs did."""
+    seen = {one.name: np.concatenate([one.of(state) for state in states]) for one in (RATE, ACCELERATION, ANGLE, TIME)}
+    rate, acceleration = _largest(states, RATE), _largest(states, ACCELERATION)
+    usual = max(float(np.sqrt(np.mean(seen["alpha"] ** 2))) / 2.0, 0.05)
+    slow = max(rate / 6.0, 0.05)
+    first, turned = float(seen["theta"][0]), max(float(np.ptp(seen["theta"])), 1e-9)
+    forms = [
+        Form("1", "1", "always", _NOTHING, np.asarray, 1.0),
+        *(
+            Form(name, "omega", f"in proportion to {words}", RATE, function, rate**power)
+            for name, words, function, power in (
+                ("omega", "the rate", lambda x: x, 1),
+                ("omega^2", "rate²", lambda x: x**2, 2),
+                ("omega^3", "rate³", lambda x: x**3, 3),
+                ("omega^4", "rate⁴", lambda x: x**4, 4),
+                ("|omega|", "|rate|", np.abs, 1),
+                ("omega|omega|", "rate · |rate|", lambda x: x * np.abs(x), 2),
+            )
+        ),
+        Form("alpha", "alpha", "in proportion to the angular acceleration", ACCELERATION, np.asarray, acceleration),
+        Form("|alpha|", "alpha", "in proportion to |angular acceleration|", ACCELERATION, np.abs, acceleration),
+        Form(
+            "alpha omega",
+            "omega, alpha",
+            "in proportion to rate · angular acceleration",
+            ACCELERATION,
+            np.asarray,
+            acceleration * rate,
+            RATE,
+        ),
+        Form("theta", "theta", "in proportion to the angle turned", ANGLE, lambda x: x - first, turned),
+        Form("t", "t", "in proportion to time", TIME, np.asarray, float(seen["t"].max()), None, of_one_recording=True),
+    ]
+    lengths = (0.15, 0.5, 1.5)
+    curves = [
+        curve_over(RATE, seen["omega"], 16, lengths, warp=slow),
+        curve_over(ACCELERATION, seen["alpha"], 12, lengths, warp=usual),
+        curve_over(ANGLE, seen["theta"], 12, lengths),
+        curve_over(TIME, seen["t"], 24, (0.05, 0.2, 0.7)),
+        Product(
+            curve_over(RATE, seen["omega"], 7, (0.5,), warp=slow),
+            curve_over(ACCELERATION, seen["alpha"], 7, (0.5,), warp=usual),
+        ),
+        Revolution("revolution", lambda state: np.ones_like(state.t)),
+        Revolution("revolution |omega|", lambda state: np.abs(state.spin.rate) / rate),
+        Revolution("revolution omega^2", lambda state: state.spin.rate**2 / rate**2),
+        Revolution("revolution omega", lambda state: state.spin.rate / rate),
+        Memory(ACCELERATION, acceleration),
+    ]
+    return {one.name: one for one in (*forms, *curves, *_of_temperature(states))}
+
+
+def _of_temperature(states: Sequence[RigState]) -> list[Dependence]:
+    if any(state.temperature is None for state in states):
+        return []
+    seen = np.concatenate([_temperature(state) for state in states])
+    first, spread = float(seen[0]), float(np.ptp(seen))
+    if not spread > _WARMED:
+        return []
+    steep = max(float(np.std(np.concatenate([_warming(state) for state in states]))), 1e-9)
+    return [
+        Form("T", "T", "in proportion to the temperature", TEMPERATURE, lambda x: x - first, spread),
+        curve_over(TEMPERATURE, seen, 6, (0.3, 1.0)),
+        Form("dT/dt", "T", "in proportion to the warming", _WARMING, np.asarray, steep),
+        LowPassed(TEMPERATURE, first, spread),
+    ]
+
+
+_OF_REFERENCE = (
+    *("1", "f(omega)", "f(alpha)", "f(omega, alpha)", "f(theta)", "revolution", "revolution |omega|"),
+    *("revolution omega", "f(t)", "memory of alpha", "omega", "omega^2", "omega^3", "|omega|"),
+    *("omega|omega|", "|alpha|", "alpha omega", "theta"),
+)
+_OF_RIG = (
+    *("f(omega)", "f(alpha)", "f(theta)", "revolution", "revolution |omega|", "revolution omega^2", "f(t)"),
+    *("omega", "omega^2", "omega^3", "|omega|", "omega|omega|", "alpha", "|alpha|", "alpha omega", "theta", "f(T)"),
+)
+_OF_PLACE = {
+    "reads": _OF_REFERENCE,
+    "late": ("1", "t", "f(t)", "f(T)"),
+    "leans": ("1", *_OF_RIG, "memory of alpha"),
+    "moves": ("1", *_OF_RIG, "memory of alpha"),
+    "stretches": ("1", *_OF_RIG),
+    "shakes": (*_OF_RIG, "memory of alpha"),
+    "tilts": ("1", *_OF_RIG),
+    "gain": ("1", *_OF_RIG, "f(omega, alpha)", "t"),
+}
+_MODES_OF_PLACE = {"reads": (0, 1, 2), "leans": (0,), "moves": (0,), "shakes": (2,), "tilts": (0,)}
+"""What of a mode an error there may follow: displacement, velocity, acceleration."""
+
+
+def rig_terms(states: Sequence[RigState], every: dict[str, Dependence], *, is_angle: bool) -> list[LocatedTerm]:
+    """Return the terms of places in the rig, but those of waves that are looked for."""
+    places = rig_places(is_angle=is_angle)
+    terms = [LocatedTerm(places[what], every[n]) for what, names in _OF_PLACE.items() for n in names if n in every]
+    for what, outputs in _MODES_OF_PLACE.items():
+        regressors = _FORCES if places[what].name == "bench" else (ACCELERATION, _SQUARE)
+        terms += [LocatedTerm(places[what], mode) for mode in _modes(states, regressors, outputs)]
+    return terms
+
+
+def _modes(states: Sequence[RigState], regressors: Sequence[Regressor], outputs: tuple[int, ...]) -> list[Mode]:
+    slow = _MODES_HZ[_FASTEST / states[0].period > _MODES_HZ]
+    return [Mode(one, _largest(states, one), float(hz), outputs) for one in regressors for hz in slow]
+
+
+@dataclass(frozen=True)
+class ChannelTerms:
+    """The terms of one dependence on one kind of error of channels, whose columns they share.
+
+    ``patterns`` holds of each the place of the contract, the pattern, the groups of channels and their names.
+    """
+
+    kind: str
+    dependence: Dependence
+    patterns: tuple[ChannelPattern, ...]
+
+    def terms(self) -> list[tuple[LocatedTerm, tuple[tuple[int, ...], ...]]]:
+        """Return the terms with their groups of channels."""
+        return [
+            (LocatedTerm(channel_place(name, self.kind, groups, labels), self.dependence, pattern), groups)
+            for name, pattern, groups, labels in self.patterns
+        ]
+
+
+def channel_terms(
+    states: Sequence[RigState], every: dict[str, Dependence], array: AccelerometerArray
+) -> list[ChannelTerms]:
+    """Return the terms of channels and chips."""
+    chips, names = chip_groups(array), tuple(chip.name for chip in array.chips)
+    several = [(chip, name) for chip, name in zip(chips, names, strict=True) if len(chip) > 1]
+    of_chip: tuple[ChannelPattern, ...] = tuple(
+        ("chip", "chip", tuple((c,) for c in chip), tuple(array.channels[c] for c in chip)) for chip, _ in several
+    )
+    alike: tuple[ChannelPattern, ...] = tuple(("chip", "chip", (chip,), (name,)) for chip, name in several)
+    clocks: list[ChannelPattern] = [("clock", "chip", (one,), (name,)) for one, name in zip(chips, names, strict=True)]
+    clocks += [("clock", "own", chips, names)] if len(chips) > 1 else []
+    each = channel_patterns(array)
+    most = max(float(np.abs(state.readings).max()) for state in states)
+    readings: list[Dependence] = [OfReading("f(y)", "as a function of the reading", most)]
+    readings += [OfReading(f"y^{n}", f"in proportion to reading{p}", most, n) for n, p in ((2, "²"), (3, "³"))]
+    offsets = [one for name, one in every.items() if name not in ("memory of alpha", "revolution omega")]
+    modes = _modes(states, (ACCELERATION, _SQUARE), (2,))
+    gains = ("1", "f(omega)", "f(t)", "omega", "omega^2", "|omega|", "t", "f(T)")
+    late = ("1", "t", "f(t)")
+    return [
+        *(ChannelTerms("offset", one, (*each, *of_chip)) for one in (*offsets, *readings)),
+        *(ChannelTerms("gain", every[name], (*each, *alike)) for name in gains if name in every),
+        *(ChannelTerms("delay", every[name], tuple(clocks)) for name in late),
+        *(ChannelTerms("offset", mode, of_chip) for mode in modes),
+    ]
+
+
+def chip_groups(array: AccelerometerArray) -> tuple[tuple[int, ...], ...]:
+    """Return the channels of each chip."""
+    return tuple(tuple(np.flatnonzero(array.chip_of_channel == chip).tolist()) for chip in range(len(array.chips)))
+
+
+def channel_patterns(array: AccelerometerArray) -> tuple[ChannelPattern, ...]:
+    """Return the patterns of an error of one channel, and of an error of each channel's own."""
+    single = tuple((index,) for index in range(array.n_channels))
+    one: list[ChannelPattern] = [("channel", "one", (group,), (array.channels[group[0]],)) for group in single]
+    return (*one, ("channel", "own", single, tuple(array.channels)))

@@ -1,0 +1,476 @@
+"""What an unknown function is of: the motion, the angle, time, temperature or a reading, with a prior of functions.
+
+A function without a form is a Gaussian process with a squared-exponential covariance, on cubic B-splines of a warped
+regressor (Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, ch. 2). One-number forms compete with
+these: they win where they serve, as they have fewer coefficients, and they extrapolate.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline
+from scipy.signal import cont2discrete, lfilter, ss2tf
+
+from gfimu.base.units import STANDARD_GRAVITY
+from gfimu.diagnosis.data.added import RigState
+
+__all__ = [
+    "Curve",
+    "Dependence",
+    "Form",
+    "LowPassed",
+    "Memory",
+    "Mode",
+    "OfReading",
+    "Product",
+    "Regressor",
+    "Revolution",
+    "Wave",
+    "curve_over",
+]
+
+_Floats = NDArray[np.float64]
+_STILL = 0.05  # numerical: rad/s
+_LEAST_PRIOR = 1e-6  # numerical: share of the variance below which the prior hardly allows a combination
+
+
+@dataclass(frozen=True)
+class Regressor:
+    """A quantity that an error may go with.
+
+    Parameters
+    ----------
+    name : str
+        As in ``verdict.json``: omega, alpha, theta, t, T.
+    words : str
+        For people.
+    unit : str
+        Its unit.
+    of : callable
+        From the state of a rig to its values (n,).
+    """
+
+    name: str
+    words: str
+    unit: str
+    of: Callable[[RigState], _Floats]
+
+
+class Dependence(ABC):
+    """A linear family of functions of what a rig does.
+
+    ``name`` identifies it in ``verdict.json``, ``kind`` is the same for all that mean the same to a person, ``words``
+    say how an error goes with it, ``looks`` is what it costs to have been chosen among many alike, nats, ``memory_s``
+    how long it remembers the drive, and ``of_one_recording`` whether it is of absolute time.
+    """
+
+    name: str
+    kind: str
+    words: str
+    looks: float = 0.0
+    memory_s: float = 0.0
+    of_one_recording: bool = False
+
+    @property
+    @abstractmethod
+    def roots(self) -> tuple[_Floats, ...]:
+        """Roots (K, k) of the prior covariance of the coefficients, one for each length scale that is tried."""
+
+    @abstractmethod
+    def values(self, state: RigState) -> _Floats:
+        """Return the functions at the samples, (n, K), or (c + 1, n, K) where each observation has its own."""
+
+    @property
+    def abscissa(self) -> Regressor | None:
+        """What a picture of the function is drawn over; None where it is no function of one quantity."""
+        return None
+
+    def near(self, width: float) -> list[Dependence]:
+        """Return dependences of another shape nearby, where it has a shape: a frequency, a damping, an order."""
+        del width
+        return []
+
+    @property
+    def count(self) -> int:
+        """Number K of functions."""
+        return len(self.roots[0])
+
+
+def _covariance_root(centres: _Floats, length: float) -> _Floats:
+    """Return a root (K, k) of the squared-exponential covariance at centres (K,)."""
+    power, turn = np.linalg.eigh(np.exp(-0.5 * ((centres[:, None] - centres) / length) ** 2))
+    kept = power > _LEAST_PRIOR * power[-1]
+    return np.asarray(turn[:, kept] * np.sqrt(power[kept]))
+
+
+@dataclass(frozen=True)
+class Form(Dependence):
+    """One function of a regressor x times a number: ``function`` of x over ``scale``."""
+
+    name: str
+    kind: str
+    words: str
+    regressor: Regressor
+    function: Callable[[_Floats], _Floats]
+    scale: float
+    times: Regressor | None = None
+    of_one_recording: bool = False
+
+    @property
+    def roots(self) -> tuple[_Floats, ...]:
+        """Roots of the prior covariance, one for each length scale."""
+        return (np.eye(1),)
+
+    @property
+    def abscissa(self) -> Regressor | None:
+        """What a picture of the function is drawn over."""
+        return None if self.times or not self.regressor.unit else self.regressor
+
+    def values(self, state: RigState) -> _Floats:
+        """Return the functions at the samples."""
+        values = self.function(self.regressor.of(state)) / self.scale
+        return (values if self.times is None else values * self.times.of(state))[:, None]
+
+
+@dataclass(frozen=True)
+class Curve(Dependence):
+    """A smooth function of one regressor: cubic B-splines of asinh(x / warp), or of x itself where ``warp`` is 0."""
+
+    name: str
+    kind: str
+    words: str
+    regressor: Regressor
+    low: float
+    high: float
+    functions: int
+    lengths: tuple[float, ...]
+    warp: float = 0.0
+    of_one_recording: bool = False
+
+    @cached_property
+    def grid(self) -> _Floats:
+        """Knots, on the scale 0 to 1."""
+        inner = np.linspace(-1e-9, 1.0 + 1e-9, self.functions - 2)
+        return np.concatenate([[inner[0]] * 3, inner, [inner[-1]] * 3])
+
+    @cached_property
+    def roots(self) -> tuple[_Floats, ...]:  # type: ignore[override]
+        """Roots of the prior covariance, one for each length scale."""
+        centres = np.convolve(self.grid, np.ones(3) / 3.0, "valid")[1:-1]
+        return tuple(_covariance_root(centres, length) for length in self.lengths)
+
+    @property
+    def abscissa(self) -> Regressor | None:
+        """What a picture of the function is drawn over."""
+        return self.regressor
+
+    def values(self, state: RigState) -> _Floats:
+        """Return the functions at the samples."""
+        return self.at(self.regressor.of(state))
+
+    def at(self, x: _Floats) -> _Floats:
+        """Return the splines at values (n,) of the regressor, shape (n, K)."""
+        low, high, here = (np.arcsinh(v / self.warp) if self.warp else v for v in (self.low, self.high, x))
+        share = np.clip((here - low) / max(high - low, 1e-12), 0.0, 1.0)
+        return np.asarray(BSpline.design_matrix(share, self.grid, 3).toarray())
+
+
+def curve_over(
+    regressor: Regressor, seen: _Floats, functions: int, lengths: tuple[float, ...], *, warp: float = 0.0
+) -> Curve:
+    """Return a smooth function over the range of a regressor that was seen (n,)."""
+    low, high = float(seen.min()), float(seen.max())
+    name, words = f"f({regressor.name})", f"as a function of {regressor.words}"
+    return Curve(name, regressor.name, words, regressor, low, high, functions, lengths, warp, regressor.name == "t")
+
+
+@dataclass(frozen=True)
+class Product(Dependence):
+    """A smooth function of two regressors."""
+
+    first: Curve
+    second: Curve
+
+    @property
+    def name(self) -> str:  # type: ignore[override]
+        """Name in ``verdict.json``."""
+        return f"f({self.kind})"
+
+    @property
+    def kind(self) -> str:  # type: ignore[override]
+        """The same for all that mean the same to a person."""
+        return f"{self.first.kind}, {self.second.kind}"
+
+    @property
+    def words(self) -> str:  # type: ignore[override]
+        """How an error goes with it."""
+        return f"as a function of {self.first.regressor.words} and {self.second.regressor.words}"
+
+    @cached_property
+    def roots(self) -> tuple[_Floats, ...]:  # type: ignore[override]
+        """Roots of the prior covariance, one for each length scale."""
+        return (np.kron(self.first.roots[0], self.second.roots[0]),)
+
+    def values(self, state: RigState) -> _Floats:
+        """Return the functions at the samples."""
+        one, other = self.first.values(state), self.second.values(state)
+        return (one[:, :, None] * other[:, None, :]).reshape(len(one), -1)
+
+
+@dataclass(frozen=True)
+class Revolution(Dependence):
+    """A function of the angle within a revolution, by harmonics, times an envelope."""
+
+    name: str
+    envelope: Callable[[RigState], _Floats]
+    harmonics: int = 8
+    kind: str = "revolution"
+    words: str = "by the angle within a revolution"
+
+    @property
+    def roots(self) -> tuple[_Floats, ...]:
+        """Roots of the prior covariance, one for each length scale."""
+        order = np.repeat(np.arange(1.0, self.harmonics + 1), 2)
+        return np.diag(np.asarray(1.0 / np.sqrt(order))), np.diag(np.asarray(1.0 / order**2))
+
+    def values(self, state: RigState) -> _Floats:
+        """Return the functions at the samples."""
+        phase = np.outer(state.spin.angle, np.arange(1, self.harmonics + 1))
+        waves = np.stack([np.cos(phase), np.sin(phase)], axis=2).reshape(len(phase), -1)
+        return np.asarray(waves * self.envelope(state)[:, None])
+
+
+@dataclass(frozen=True)
+class Wave(Dependence):
+    """A wave that was looked for: cycles per revolution, or per second of time.
+
+    Parameters
+    ----------
+    cycles : float
+        Cycles per revolution, or Hz.
+    apart : float
+        How far two waves must be apart to be told from each other in the recording.
+    of_time : bool
+        Whether it is of time, and not of the angle.
+    fastest : float
+        Rate by which its amplitude grows to one, rad/s; 0 where it does not grow with the rate.
+    """
+
+    cycles: float
+    apart: float
+    of_time: bool = False
+    fastest: float = 0.0
+    looks: float = 6.0
+
+    @property
+    def name(self) -> str:  # type: ignore[override]
+        """Name in ``verdict.json``."""
+        return f"tone at {self.cycles:.4g} Hz" if self.of_time else f"order {self.cycles:.4g}{self._growth}"
+
+    @property
+    def kind(self) -> str:  # type: ignore[override]
+        """The same for all that mean the same to a person."""
+        return "tone" if self.of_time else "order"
+
+    @property
+    def words(self) -> str:  # type: ignore[override]
+        """How an error goes with it."""
+        if self.of_time:
+            return f"at {self.cycles:.4g} Hz, whatever the motion"
+        return f"{self.cycles:.4g} times per revolution{', in proportion to |rate|' if self.fastest else ''}"
+
+    @property
+    def of_one_recording(self) -> bool:  # type: ignore[override]
+        """Whether it is of absolute time."""
+        return self.of_time
+
+    @property
+    def _growth(self) -> str:
+        return " |omega|" if self.fastest else ""
+
+    @property
+    def roots(self) -> tuple[_Floats, ...]:
+        """Roots of the prior covariance, one for each length scale."""
+        return (np.eye(2),)
+
+    def near(self, width: float) -> list[Dependence]:
+        """Return dependences of another shape nearby."""
+        steps = np.array([-1.0, -0.5, 0.5, 1.0]) * width * self.apart
+        return [replace(self, cycles=self.cycles + float(step)) for step in steps]
+
+    def values(self, state: RigState) -> _Floats:
+        """Return the functions at the samples."""
+        phase = self.cycles * (2.0 * np.pi * state.t if self.of_time else state.spin.angle)
+        speed = np.abs(state.spin.rate)
+        envelope = speed / self.fastest if self.fastest else np.where(self.of_time | (speed > _STILL), 1.0, 0.0)
+        return np.asarray(np.column_stack([np.cos(phase), np.sin(phase)]) * envelope[:, None])
+
+
+@dataclass(frozen=True)
+class Memory(Dependence):
+    """A regressor at several times before: any linear filter of it that forgets within the longest lag."""
+
+    regressor: Regressor
+    scale: float
+    lags_s: tuple[float, ...] = (0.0, 0.01, 0.02, 0.03, 0.05, 0.08, 0.12, 0.2, 0.3)
+
+    @property
+    def name(self) -> str:  # type: ignore[override]
+        """Name in ``verdict.json``."""
+        return f"memory of {self.regressor.name}"
+
+    @property
+    def kind(self) -> str:  # type: ignore[override]
+        """The same for all that mean the same to a person."""
+        return self.name
+
+    @property
+    def words(self) -> str:  # type: ignore[override]
+        """How an error goes with it."""
+        return f"with {self.regressor.words} of the last {max(self.lags_s):g} s"
+
+    @property
+    def memory_s(self) -> float:  # type: ignore[override]
+        """How long it remembers the drive, s."""
+        return max(self.lags_s)
+
+    @cached_property
+    def roots(self) -> tuple[_Floats, ...]:  # type: ignore[override]
+        """Roots of the prior covariance, one for each length scale."""
+        lags = np.array(self.lags_s)
+        return np.hstack([_covariance_root(lags, 0.02), 0.01 * np.eye(len(lags))]), np.eye(len(lags))
+
+    def values(self, state: RigState) -> _Floats:
+        """Return the functions at the samples."""
+        x = self.regressor.of(state) / self.scale
+        return np.column_stack([np.interp(state.t - lag, state.t, x) for lag in self.lags_s])
+
+
+@dataclass(frozen=True)
+class LowPassed(Dependence):
+    """A regressor, less its first value, behind first-order filters."""
+
+    regressor: Regressor
+    first: float
+    scale: float
+    times_s: tuple[float, ...] = (5.0, 20.0, 60.0)
+
+    @property
+    def name(self) -> str:  # type: ignore[override]
+        """Name in ``verdict.json``."""
+        return f"{self.regressor.name} lagging"
+
+    @property
+    def kind(self) -> str:  # type: ignore[override]
+        """The same for all that mean the same to a person."""
+        return self.regressor.name
+
+    @property
+    def words(self) -> str:  # type: ignore[override]
+        """How an error goes with it."""
+        return f"behind {self.regressor.words}"
+
+    @property
+    def roots(self) -> tuple[_Floats, ...]:
+        """Roots of the prior covariance, one for each length scale."""
+        return (np.eye(len(self.times_s)),)
+
+    def values(self, state: RigState) -> _Floats:
+        """Return the functions at the samples."""
+        x = (self.regressor.of(state) - self.first) / self.scale
+        shares = [np.exp(-state.period / time) for time in self.times_s]
+        return np.column_stack([lfilter([1.0 - share], [1.0, -share], x) for share in shares])
+
+
+@dataclass(frozen=True)
+class Mode(Dependence):
+    """The response of a damped oscillator to a regressor: displacement, velocity and acceleration, in its units."""
+
+    regressor: Regressor
+    scale: float
+    frequency_hz: float
+    outputs: tuple[int, ...] = (0, 1, 2)
+    damping: float = 0.07
+    looks: float = 4.0
+
+    @property
+    def name(self) -> str:  # type: ignore[override]
+        """Name in ``verdict.json``."""
+        return f"mode at {self.frequency_hz:.3g} Hz of {self.regressor.name}"
+
+    @property
+    def kind(self) -> str:  # type: ignore[override]
+        """The same for all that mean the same to a person."""
+        return f"mode of {self.regressor.name.split(' ')[0]}"
+
+    @property
+    def words(self) -> str:  # type: ignore[override]
+        """How an error goes with it."""
+        return f"as a mode near {self.frequency_hz:.2g} Hz that {self.regressor.words} excites"
+
+    def near(self, width: float) -> list[Dependence]:
+        """Return dependences of another shape nearby."""
+        faster, damped = np.exp(0.15 * width * np.arange(-2, 3)), np.exp(width * np.arange(-1, 2))
+        pairs = [(self.frequency_hz * f, self.damping * z) for f in faster for z in damped]
+        return [replace(self, frequency_hz=float(f), damping=float(min(z, 1.0))) for f, z in pairs]
+
+    @property
+    def memory_s(self) -> float:  # type: ignore[override]
+        """How long it remembers the drive, s."""
+        return 3.0 / (2.0 * np.pi * self.frequency_hz * self.damping)
+
+    @property
+    def roots(self) -> tuple[_Floats, ...]:
+        """Roots of the prior covariance, one for each length scale."""
+        return (np.eye(len(self.outputs)),)
+
+    def values(self, state: RigState) -> _Floats:
+        """Return the functions at the samples."""
+        omega = 2.0 * np.pi * self.frequency_hz
+        drag = 2.0 * self.damping * omega
+        continuous = (
+            np.array([[0.0, 1.0], [-(omega**2), -drag]]),
+            np.array([[0.0], [1.0]]),
+            np.array([[omega**2, 0.0], [0.0, omega], [-(omega**2), -drag]]),
+            np.array([[0.0], [0.0], [1.0]]),
+        )
+        a, b, c, d, _ = cont2discrete(continuous, state.period, "foh")
+        numerators, denominator = ss2tf(a, b, c, d)
+        x = self.regressor.of(state) / self.scale
+        return np.column_stack([lfilter(numerators[output], denominator, x) for output in self.outputs])
+
+
+@dataclass(frozen=True)
+class OfReading(Dependence):
+    """A function of each channel's own reading: its power, or a smooth one up to the largest reading."""
+
+    name: str
+    words: str
+    most: float
+    power: int = 0
+    kind: str = "own reading"
+
+    @cached_property
+    def _curve(self) -> Curve:
+        reading = Regressor("y", "the reading", "m/s²", lambda state: state.t)
+        return Curve(
+            self.name, self.kind, self.words, reading, -self.most, self.most, 10, (0.15, 0.5, 1.5), self.most / 8.0
+        )
+
+    @property
+    def roots(self) -> tuple[_Floats, ...]:
+        """Roots of the prior covariance, one for each length scale."""
+        return (np.eye(1),) if self.power else self._curve.roots
+
+    def values(self, state: RigState) -> _Floats:
+        """Return the functions at the samples."""
+        readings = np.column_stack([state.readings, np.zeros(len(state.t))]).T  # (c + 1, n)
+        if self.power:
+            return (readings[:, :, None] / STANDARD_GRAVITY) ** self.power
+        return np.stack([self._curve.at(mine) for mine in readings])

@@ -1,0 +1,248 @@
+"""Places of the forward model: what a small error φ(t) there changes in channels and reference, to first order.
+
+With the sensing axis a of a chip at r in the frame that turns with the table, e a unit vector, z the axis, u the
+specific force of gravity and F that of the chip, all in that frame, and e′ a unit vector of the room in that frame:
+
+    the reference reads φ more:    Ω + φ
+    the array moves by φ e:        a·(φ̈ e + 2ω φ̇ z×e + α φ z×e + ω² φ z×(z×e))
+    the array leans by φ e:        the same of e × r, and φ (e × a)·F
+    the array vibrates along e:    a·e φ
+    its arms stretch by φ:         the same of the part of r across the axis
+    the bench shakes:              a·e′ φ
+    the axis tilts by φ e′:        a·(φ̈ e′×r + 2ω φ̇ e′×(z×r) − φ e′×u)
+    the table turns by φ more:     a·(φ̈ z×r + 2ω φ̇ z×(z×r)), and the reference reads it
+
+Each is A φ + B φ̇ + C φ̈ with A, B and C per observation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gfimu.diagnosis.data.added import RigState
+
+__all__ = ["Operator", "Place", "channel_place", "rig_places"]
+
+_Z = np.array([0.0, 0.0, 1.0])
+_Floats = NDArray[np.float64]
+_Groups = tuple[tuple[int, ...], ...]
+
+
+@dataclass(frozen=True)
+class Operator:
+    """A φ + B φ̇ + C φ̈ on each observation, each of A, B and C (n, c + 1); None where it is zero."""
+
+    of_value: _Floats | None
+    of_rate: _Floats | None = None
+    of_acceleration: _Floats | None = None
+
+    @property
+    def parts(self) -> tuple[_Floats | None, _Floats | None, _Floats | None]:
+        """A, B and C."""
+        return self.of_value, self.of_rate, self.of_acceleration
+
+    @property
+    def reached(self) -> NDArray[np.intp]:
+        """Observations that it changes."""
+        changed = [part.any(axis=0) for part in self.parts if part is not None]
+        return np.flatnonzero(np.any(changed, axis=0))
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where an error is, and what it is of.
+
+    Parameters
+    ----------
+    name : str
+        Place of the contract: reference, motion, array, bench, supply, channel, chip, clock.
+    what : str
+        What the error is, which identifies it beside the name: ``leans``, ``offset`` and so on.
+    words : str
+        The error in words, as the subject and verb of a sentence.
+    unit : str
+        Unit of the error.
+    usual : float
+        Its usual size, in that unit.
+    components : tuple of str
+        Names of its components: axes, channels or chips.
+    operators : callable
+        From the state of the rig to the operator of each component.
+    """
+
+    name: str
+    what: str
+    words: str
+    unit: str
+    usual: float
+    components: tuple[str, ...]
+    operators: Callable[[RigState], Sequence[Operator]]
+
+
+def rig_places(*, is_angle: bool) -> dict[str, Place]:
+    """Return the places in the rig, by what the error there is; ``is_angle`` of a reference that is an angle."""
+    read = "rad" if is_angle else "rad/s"
+    places = (
+        Place("reference", "reads", "the reference reads otherwise than the table turns", read, 0.05, ("",), _reads),
+        Place("clock", "late", "the reference is late", "s", 5e-3, ("",), partial(_is_late, is_angle)),
+        Place(
+            *("motion", "turns", "the table turns otherwise than the drive is modelled", "rad", 5e-3, ("",)),
+            partial(_turns, is_angle),
+        ),
+        Place("array", "leans", "the array leans on the table", "rad", 2e-3, ("x", "y"), _leans),
+        Place("array", "moves", "the array moves on the table", "m", 1e-3, ("x", "y", "z"), _moves),
+        Place("array", "stretches", "the array stretches away from the axis", "1", 5e-3, ("",), _stretches),
+        Place("array", "vibrates", "the array vibrates with the table", "m/s²", 0.05, ("x", "y", "z"), _vibrates),
+        Place("bench", "shakes", "the bench shakes", "m/s²", 0.05, ("x", "y", "z"), _shakes),
+        Place("bench", "tilts", "the axis tilts in the room", "rad", 2e-3, ("x", "y"), _tilts),
+        Place("supply", "gain", "the gain of all channels changes", "1", 5e-3, ("",), _gain_of_all),
+    )
+    return {place.what: place for place in places}
+
+
+def channel_place(name: str, kind: str, groups: _Groups, labels: Sequence[str]) -> Place:
+    """Return the place of an error of channels, with a component for each group of channels that share it.
+
+    Parameters
+    ----------
+    name : str
+        ``channel``, ``chip`` or ``clock``.
+    kind : str
+        ``offset``, ``gain`` or ``delay``.
+    groups : tuple of tuple of int
+        Channels of each component.
+    labels : sequence of str
+        Name of each component.
+    """
+    words, unit, usual, operators = _CHANNEL_KINDS[kind]
+    few = ", ".join(labels) if len(labels) < 4 else f"{len(labels)} {'chips' if name == 'clock' else 'channels'}"
+    return Place(name, kind, words.format(few), unit, usual, tuple(labels), partial(operators, groups))
+
+
+def _turned_back(state: RigState, vector: _Floats) -> _Floats:
+    """Return a vector of the room (3,) in the turning frame, shape (n, 3)."""
+    cos, sin = np.cos(state.spin.angle), np.sin(state.spin.angle)
+    x, y, z = vector
+    return np.stack([cos * x + sin * y, cos * y - sin * x, np.full_like(cos, z)], axis=-1)
+
+
+def _along(axes: _Floats, vectors: _Floats) -> _Floats:
+    return np.einsum("ck,ck->c", axes, vectors)
+
+
+def _observed(channels: _Floats, reference: _Floats | float = 0.0) -> _Floats:
+    """Return what changes channels (n, c) and the reference (n,) as one, shape (n, c + 1)."""
+    return np.column_stack([channels, np.broadcast_to(reference, len(channels))])
+
+
+def _of_moved(state: RigState, moved: _Floats) -> tuple[_Floats, _Floats, _Floats]:
+    """Return A, B and C (n, c) of chips that move by φ times vectors (c, 3)."""
+    axes, rate = state.placed.axes, state.spin.rate
+    across = np.cross(_Z, moved)
+    beside, inward = _along(axes, across), _along(axes, np.cross(_Z, across))
+    of_value = np.outer(state.spin.acceleration, beside) + np.outer(rate**2, inward)
+    return of_value, np.outer(2.0 * rate, beside), np.tile(_along(axes, moved), (len(rate), 1))
+
+
+def _operator(of_value: _Floats, of_rate: _Floats, of_acceleration: _Floats) -> Operator:
+    return Operator(_observed(of_value), _observed(of_rate), _observed(of_acceleration))
+
+
+def _reads(state: RigState) -> list[Operator]:
+    return [Operator(_observed(np.zeros_like(state.readings), 1.0))]
+
+
+def _is_late(is_angle: bool, state: RigState) -> list[Operator]:
+    lost = state.spin.rate if is_angle else state.spin.acceleration
+    return [Operator(_observed(np.zeros_like(state.readings), -lost))]
+
+
+def _turns(is_angle: bool, state: RigState) -> list[Operator]:
+    axes, across = state.placed.axes, np.cross(_Z, state.placed.places)
+    by_rate = np.outer(2.0 * state.spin.rate, _along(axes, np.cross(_Z, across)))
+    by_acceleration = np.tile(_along(axes, across), (len(state.t), 1))
+    of_angle = _observed(np.zeros_like(by_rate), float(is_angle))
+    return [Operator(of_angle, _observed(by_rate, float(not is_angle)), _observed(by_acceleration))]
+
+
+def _moves(state: RigState) -> list[Operator]:
+    chips = np.ones((len(state.placed.axes), 1))
+    return [_operator(*_of_moved(state, chips * unit)) for unit in np.eye(3)]
+
+
+def _leans(state: RigState) -> list[Operator]:
+    axes, places, spin = state.placed.axes, state.placed.places, state.spin
+    across = np.cross(_Z, places)
+    inward = np.cross(_Z, across)
+    gravity = _turned_back(state, state.placed.gravity)
+    operators = []
+    for unit in np.eye(3)[:2]:
+        of_value, of_rate, of_acceleration = _of_moved(state, np.cross(unit, places))
+        turned = np.cross(unit, axes)
+        of_value = of_value + gravity @ turned.T + np.outer(spin.acceleration, _along(turned, across))
+        of_value += np.outer(spin.rate**2, _along(turned, inward))
+        operators.append(_operator(of_value, of_rate, of_acceleration))
+    return operators
+
+
+def _stretches(state: RigState) -> list[Operator]:
+    return [_operator(*_of_moved(state, state.placed.places * [1.0, 1.0, 0.0]))]
+
+
+def _shakes(state: RigState) -> list[Operator]:
+    return [Operator(_observed(_turned_back(state, unit) @ state.placed.axes.T)) for unit in np.eye(3)]
+
+
+def _vibrates(state: RigState) -> list[Operator]:
+    return [Operator(_observed(np.tile(state.placed.axes @ unit, (len(state.t), 1)))) for unit in np.eye(3)]
+
+
+def _tilts(state: RigState) -> list[Operator]:
+    axes, places = state.placed.axes, state.placed.places
+    gravity, across = _turned_back(state, state.placed.gravity), np.cross(_Z, places)
+    operators = []
+    for unit in np.eye(3)[:2]:
+        turned = _turned_back(state, unit)
+        of_value = -np.cross(turned, gravity) @ axes.T
+        of_rate = 2.0 * state.spin.rate[:, None] * (turned @ np.cross(across, axes).T)  # a·(e × v) = e·(v × a)
+        operators.append(_operator(of_value, of_rate, turned @ np.cross(places, axes).T))
+    return operators
+
+
+def _gain_of_all(state: RigState) -> list[Operator]:
+    return [Operator(_observed(state.readings))]
+
+
+def _on_groups(values: _Floats, groups: _Groups) -> list[Operator]:
+    """Return the operators of values (n, c) on each group of channels."""
+    operators = []
+    for group in groups:
+        of_value = np.zeros((len(values), values.shape[1] + 1))
+        of_value[:, list(group)] = values[:, list(group)]
+        operators.append(Operator(of_value))
+    return operators
+
+
+def _offset(groups: _Groups, state: RigState) -> list[Operator]:
+    return _on_groups(np.ones_like(state.readings), groups)
+
+
+def _gain(groups: _Groups, state: RigState) -> list[Operator]:
+    return _on_groups(state.readings, groups)
+
+
+def _delay(groups: _Groups, state: RigState) -> list[Operator]:
+    return _on_groups(-np.gradient(state.readings, state.period, axis=0), groups)
+
+
+_CHANNEL_KINDS: dict[str, tuple[str, str, float, Callable[[_Groups, RigState], Sequence[Operator]]]] = {
+    "offset": ("the offset of {} changes", "m/s²", 0.05, _offset),
+    "gain": ("the gain of {} changes", "1", 5e-3, _gain),
+    "delay": ("the sampling of {} is late", "s", 5e-3, _delay),
+}
+"""Errors of channels: words, unit, usual size, operators."""
