@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from gfimu.diagnosis.criticism.views.rigid_motion import motion_columns, rigid_motion
     from gfimu.diagnosis.criticism.views.run_view import RunView
     from gfimu.diagnosis.criticism.views.run_views import run_views
+    from gfimu.diagnosis.data.added import RigState
     from gfimu.diagnosis.data.body.gyro import smooth_gyro
     from gfimu.diagnosis.data.body.prepared import prepare_bodies, robust_prediction
     from gfimu.diagnosis.data.cosine_basis import CosineBasis, NoiseLevels
@@ -39,16 +40,21 @@ if TYPE_CHECKING:
     from gfimu.diagnosis.report.plain_words import headline, next_steps, story
     from gfimu.diagnosis.report.rig import DrawnRig
     from gfimu.diagnosis.report.tables import diagnosis_tables
+    from gfimu.diagnosis.search.localise import localise
     from gfimu.diagnosis.search.long_run import spread_over_runs, understand_any_length
     from gfimu.diagnosis.terms.cause import Cause, effects_of, mixing_of
     from gfimu.diagnosis.terms.columns import Columns
     from gfimu.diagnosis.terms.drive import Drive
     from gfimu.diagnosis.terms.library import cause_columns, family_columns
+    from gfimu.diagnosis.terms.located.alternatives import dependences
+    from gfimu.diagnosis.terms.located.operators import channel_place, rig_places
+    from gfimu.diagnosis.terms.located.term import LocatedEffect, LocatedTerm, located_columns
     from gfimu.diagnosis.terms.observed import observe
     from gfimu.diagnosis.terms.reach import behind_wiring, disjoint
     from gfimu.diagnosis.time_limit import check_time, limited_to
     from gfimu.diagnosis.verdict.likely_mistakes import likely_mistake
-    from gfimu.diagnosis.verdict.parts import ReferenceClock, Unlisted
+    from gfimu.diagnosis.verdict.located import located
+    from gfimu.diagnosis.verdict.parts import Located, ReferenceClock, Unlisted
     from gfimu.diagnosis.verdict.place import with_place
     from gfimu.diagnosis.verdict.sample_notes import with_reference_clock, with_sample_notes
     from gfimu.diagnosis.verdict.verdict import Diagnosis

@@ -25,6 +25,7 @@ from gfimu.diagnosis.criticism.views.residual_spectrum import ResidualSpectrum
 from gfimu.diagnosis.criticism.views.residuals import ResidualSize, Whiteness
 from gfimu.diagnosis.criticism.views.rigid_motion import BandPower
 from gfimu.diagnosis.criticism.views.run_view import RunView
+from gfimu.diagnosis.verdict.parts import FunctionTable
 from gfimu.visual.page import PlotLimits
 from gfimu.visual.page.svg import ON_PAGE, svg_text
 from gfimu.visual.rig.figure import array_figure, channel_style
@@ -33,6 +34,7 @@ from gfimu.visual.rig.words import short_name
 __all__ = [
     "channels_figure",
     "dependence_figure",
+    "function_figure",
     "rig_figures",
     "rigid_figure",
     "spectrum_figure",
@@ -135,6 +137,20 @@ def dependence_figure(dependence: Dependence, array: AccelerometerArray) -> str:
             *pair[1].get_legend_handles_labels(), loc="outside lower center", ncols=len(strongest), fontsize=8,
             handlelength=1.6, columnspacing=1.0,
         )  # fmt: skip
+        return svg_text(figure)
+
+
+def function_figure(function: FunctionTable) -> str:
+    """Draw an unknown function with its band of ±2σ."""
+    x, f, std = (np.array(column) for column in (function.x, function.f, function.std))
+    with mpl.rc_context(ON_PAGE):
+        figure = Figure(figsize=_VIEW, layout="constrained")
+        axis = figure.subplots()
+        axis.axhline(0.0, color=_NOISE, linewidth=0.6)
+        axis.fill_between(x, f - 2.0 * std, f + 2.0 * std, color=_PALE, alpha=0.8, linewidth=0)
+        axis.plot(x, f, color=_BEFORE, linewidth=1.3)
+        axis.set_xlabel(function.x_unit)
+        axis.set_ylabel("ratio" if function.unit == "1" else function.unit)
         return svg_text(figure)
 
 

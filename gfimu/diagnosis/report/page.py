@@ -31,7 +31,7 @@ from gfimu.diagnosis.report.plain_words import (
 )
 from gfimu.diagnosis.report.rig import DrawnRig
 from gfimu.diagnosis.report.zooming import dependence_plot, residual_plot, spectrum_plot
-from gfimu.diagnosis.verdict.parts import NamedCause
+from gfimu.diagnosis.verdict.parts import Located, NamedCause
 from gfimu.diagnosis.verdict.verdict import Diagnosis
 from gfimu.diagnosis.verdict.wording import SAME_SHARE
 from gfimu.visual.page import Packed, page_plots, page_style, page_text
@@ -111,6 +111,7 @@ def _content(diagnosis: Diagnosis, rig: DrawnRig) -> Mapping[str, Any]:
         "sentences": diagnosis.sentences[1:],
         "figures_of_merit": _figures_of_merit(diagnosis),
         "causes": [_cause(diagnosis, cause) for cause in diagnosis.causes],
+        "located": [_located(one, array) for one in diagnosis.unexplained.located],
         "surrogate": _surrogate(diagnosis) if diagnosis.unexplained.significant else {},
         "extended": diagnosis.unexplained.extends_twin,
         "unexplained": diagnosis.unexplained,
@@ -180,6 +181,16 @@ def _array(diagnosis: Diagnosis, rig: DrawnRig) -> dict[str, Any]:
             }
             for chip in array.chips
         ],
+    }
+
+
+def _located(one: Located, array: AccelerometerArray) -> Mapping[str, Any]:
+    """Return the words and the picture of something that has a place and no name."""
+    return {
+        "text": one.text[0].upper() + one.text[1:],
+        "probability": percent(one.place_probability),
+        "instead": one.instead,
+        "picture": "" if one.function is None else _picture(figures.function_figure(one.function), array),
     }
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from gfimu import Diagnosis, NamedCause
 from gfimu.diagnosis import RunView
 from gfimu.diagnosis.criticism.gain import Gain
-from gfimu.diagnosis.verdict.parts import NoiseLevels, Residual, Rival, Unexplained
+from gfimu.diagnosis.verdict.parts import FunctionTable, Located, NoiseLevels, Residual, Rival, Unexplained
 from sim.effects import Effect, make_effect
 from sim.trials import Measurement, measure, random_profile
 from sim.twin import Twin
@@ -60,7 +60,7 @@ def made_diagnosis(verdict: str = "explained", *, seed: int = 1) -> Diagnosis:
     tilt = make_effect("table_tilt", {"x_rad": 0.004, "y_rad": -0.002})
     effects = [] if verdict == "nothing_found" else [tilt]
     run = made_run(effects, explained=[] if verdict == "unknown" else None, seed=seed)
-    causes: tuple[NamedCause, ...] = ()
+    causes: tuple[FunctionTable, Located, NamedCause, ...] = ()
     if verdict == "explained":
         causes = (_cause("table_tilt", tilt.parameters, why="gravity turns once per revolution in a11, a12, a21"),)
     if verdict == "ambiguous":
@@ -72,7 +72,21 @@ def made_diagnosis(verdict: str = "explained", *, seed: int = 1) -> Diagnosis:
         )
     unexplained = Unexplained()
     if verdict == "unknown":
-        unexplained = Unexplained(True, "once per revolution in a11 and a12", 240.0, {"a11_m_s2: cos θ": 0.02})
+        table = FunctionTable((-6.0, 0.0, 6.0), (-0.02, 0.0, 0.03), (0.004, 0.001, 0.005), "rad/s", "rad/s")
+        located = Located(
+            place="reference",
+            what="reads",
+            pattern="all",
+            series=(),
+            dependence="f(omega)",
+            text="the reference reads otherwise than the table turns, as a function of the rate (+0.03 rad/s at 6 rad/s)",
+            place_probability=0.88,
+            log_odds=230.0,
+            instead=("the axis tilts in the room, always",),
+            function=table,
+        )
+        surrogate = {"a11_m_s2: cos θ": 0.02}
+        unexplained = Unexplained(True, "once per revolution in a11 and a12", 240.0, surrogate, located=(located,))
     rivals = (Rival(("axis_wobble",), -120.0, "its inertial part at high rate is not in the data"),)
     return Diagnosis(
         verdict=verdict,

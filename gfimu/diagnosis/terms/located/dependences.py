@@ -215,7 +215,7 @@ class Product(Dependence):
     @cached_property
     def roots(self) -> tuple[_Floats, ...]:  # type: ignore[override]
         """Roots of the prior covariance, one for each length scale."""
-        return (np.kron(self.first.roots[0], self.second.roots[0]),)
+        return (np.asarray(np.kron(self.first.roots[0], self.second.roots[0]), dtype=np.float64),)
 
     def values(self, state: RigState) -> _Floats:
         """Return the functions at the samples."""
@@ -236,8 +236,8 @@ class Revolution(Dependence):
     @property
     def roots(self) -> tuple[_Floats, ...]:
         """Roots of the prior covariance, one for each length scale."""
-        order = np.repeat(np.arange(1.0, self.harmonics + 1), 2)
-        return np.diag(np.asarray(1.0 / np.sqrt(order))), np.diag(np.asarray(1.0 / order**2))
+        order: _Floats = np.repeat(np.arange(1.0, self.harmonics + 1), 2)
+        return np.diag(1.0 / np.sqrt(order)), np.diag(1.0 / order**2)
 
     def values(self, state: RigState) -> _Floats:
         """Return the functions at the samples."""

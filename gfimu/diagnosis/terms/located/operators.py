@@ -237,7 +237,7 @@ def _gain(groups: _Groups, state: RigState) -> list[Operator]:
 
 
 def _delay(groups: _Groups, state: RigState) -> list[Operator]:
-    return _on_groups(-np.gradient(state.readings, state.period, axis=0), groups)
+    return _on_groups(np.gradient(state.readings, state.period, axis=0), groups)
 
 
 _CHANNEL_KINDS: dict[str, tuple[str, str, float, Callable[[_Groups, RigState], Sequence[Operator]]]] = {

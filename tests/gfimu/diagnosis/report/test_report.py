@@ -101,6 +101,15 @@ def test_no_script_runs_but_those_of_the_page(pages):
     assert policy.rpartition("script-src ")[2] == " ".join(f"'sha256-{one}'" for one in hashes)
 
 
+def test_what_has_a_place_and_no_name_is_said_first_and_drawn(pages):
+    words, page = words_of(pages["unknown"]), pages["unknown"]
+    text = "the reference reads otherwise than the table turns, as a function of the rate (+0.03 rad/s at 6 rad/s)"
+    assert f"Something is wrong that has no name in the library: {text}." in words
+    assert "Probability of the place: 88 %." in words
+    assert "Not separable from this by these data: the axis tilts in the room, always." in words
+    assert page.count("<svg") == pages["explained"].count("<svg") + 1
+
+
 def test_the_licence_of_the_plots_is_on_the_page(pages):
     assert "Copyright (c) 2022 Leon Sorokin" in pages["explained"]
 

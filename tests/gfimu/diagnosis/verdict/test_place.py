@@ -9,7 +9,7 @@ import pytest
 from few_effects import having
 
 from gfimu import AccelerometerArray
-from gfimu.diagnosis import Policy, diagnose, make_stretches, prepare, report_html, with_place
+from gfimu.diagnosis import Policy, diagnose, headline, make_stretches, prepare, report_html, with_place
 from sim.trials import Measurement, measure
 from sim.twin import Twin
 
@@ -34,16 +34,22 @@ def found(swaying):
 def test_an_unknown_verdict_says_where_its_cause_is(found):
     assert found.verdict == "unknown"
     assert found.rigid.place == "array"
-    assert found.sentences[1] == found.rigid.sentence
     assert found.to_dict()["rigid_motion"]["place"] == "array"
     assert found.unexplained.mistake == ""
+    (located,) = found.unexplained.located
+    assert (located.place, located.what) == ("array", "vibrates")
+    assert found.sentences[1].lower() == f"{located.text.lower()}."
+    assert located.text in headline(found)
+    stated = found.to_dict()["unexplained"]["located"][0]
+    assert (stated["effect"], stated["place"]) == ("unlisted", "array")
 
 
 @pytest.mark.study
 def test_a_report_has_its_picture_and_its_sentence(found):
     page = report_html(found)
     assert "whose motion is it?" in page
-    assert page.count(found.rigid.sentence) == 2  # in words, and beside its picture
+    assert page.count(found.rigid.sentence) == 1  # beside its picture
+    assert "Where it is, and what it goes with" in page
 
 
 def test_other_verdicts_have_the_numbers_and_no_sentence(found, swaying):
