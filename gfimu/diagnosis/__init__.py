@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from gfimu.diagnosis.criticism.views.rigid_motion import motion_columns, rigid_motion
     from gfimu.diagnosis.criticism.views.run_view import RunView
     from gfimu.diagnosis.criticism.views.run_views import run_views
-    from gfimu.diagnosis.data.added import RigState
     from gfimu.diagnosis.data.body.gyro import smooth_gyro
     from gfimu.diagnosis.data.body.prepared import prepare_bodies, robust_prediction
     from gfimu.diagnosis.data.cosine_basis import CosineBasis, NoiseLevels
@@ -26,6 +25,7 @@ if TYPE_CHECKING:
     from gfimu.diagnosis.data.run import Run, prepare_run
     from gfimu.diagnosis.data.samples import frozen_stretches
     from gfimu.diagnosis.data.stretch import RunUp, make_stretches
+    from gfimu.diagnosis.data.table.rig_state import RigState
     from gfimu.diagnosis.data.table.spins import State
     from gfimu.diagnosis.data.table.start_angle import gravity_angle
     from gfimu.diagnosis.data.time_grid import time_grid
@@ -53,9 +53,8 @@ if TYPE_CHECKING:
     from gfimu.diagnosis.terms.reach import behind_wiring, disjoint
     from gfimu.diagnosis.time_limit import check_time, limited_to
     from gfimu.diagnosis.verdict.likely_mistakes import likely_mistake
-    from gfimu.diagnosis.verdict.located import located
     from gfimu.diagnosis.verdict.parts import Located, ReferenceClock, Unlisted
-    from gfimu.diagnosis.verdict.place import with_place
+    from gfimu.diagnosis.verdict.place import located, with_place
     from gfimu.diagnosis.verdict.sample_notes import with_reference_clock, with_sample_notes
     from gfimu.diagnosis.verdict.verdict import Diagnosis
 else:

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
 from gfimu.base.errors import GfimuError
-from gfimu.diagnosis.data.added import RigState, split
 from gfimu.diagnosis.data.cosine_basis import CosineBasis, NoiseLevels
 from gfimu.diagnosis.data.reference import difference_noise
 from gfimu.diagnosis.data.rounding import COARSE, NO_STEPS, Steps
 from gfimu.diagnosis.data.run import Run, smooth_rate
+from gfimu.diagnosis.data.table.rig_state import RigState, split
 from gfimu.diagnosis.data.table.spins import JoinedSpin, ScaledSpin, State
 from gfimu.diagnosis.data.table.start_angle import gravity_angle
 from gfimu.diagnosis.time_limit import check_time

@@ -60,7 +60,9 @@ def free_time(stretches: Sequence[Stretch], fitted: Fit, policy: Policy) -> list
         weights = posterior.observed.weights
         residual = posterior.whitened / np.sqrt(weights)
         for where, pattern, directions in _directions(stretch, point, index):
-            value = sum(_gained(residual, one * np.sqrt(weights), stretch.run.sample_period) for one in directions)
+            chosen = float(np.log(len(directions)))  # each component that it takes
+            gains = [_gained(residual, one * np.sqrt(weights), stretch.run.sample_period) for one in directions]
+            value = sum(max(gain - chosen, 0.0) for gain in gains)
             label = f"{where.what} {where.components}"
             before = totals[label].log_odds if label in totals else 0.0
             totals[label] = FreeTime(before + value, where, pattern)

@@ -9,18 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.array.array import AccelerometerArray
-from gfimu.diagnosis.data.added import RigState
+from gfimu.diagnosis.data.table.rig_state import RigState
 from gfimu.diagnosis.terms.located.alternatives import ChannelTerms, channel_patterns
 from gfimu.diagnosis.terms.located.dependences import Wave
 from gfimu.diagnosis.terms.located.operators import Operator, rig_places
+from gfimu.diagnosis.terms.located.policy import LOCATED
 from gfimu.diagnosis.terms.located.term import LocatedTerm
 
 __all__ = ["signal_of", "wave_terms"]
 
 _Floats = NDArray[np.float64]
 _AT_EACH_PLACE = 2  # numerical: strongest waves of each kind
-_LEAST_HZ, _LEAST_ORDER = 1.0, 0.15  # numerical: slow functions follow what is slower
-_HIGHEST_ORDER = 160.0  # numerical
 _LEAST_TURNED = 4.0 * np.pi  # numerical: rad, in which an order can be told from a function of the angle
 _PADDED = 4  # numerical: length of a transform over that of its signal
 _APART = 24  # numerical: points of that transform between two waves
@@ -79,7 +78,7 @@ def _tones(scaled: _Floats, period: float) -> list[float]:
     padded = _PADDED * len(scaled)
     power = np.abs(np.fft.rfft(scaled * np.hanning(len(scaled))[:, None], padded, axis=0)) ** 2
     frequency = np.fft.rfftfreq(padded, period)
-    return _peaks(frequency, np.where(frequency > _LEAST_HZ, power.sum(axis=1), 0.0))
+    return _peaks(frequency, np.where(frequency > LOCATED.lowest_hz, power.sum(axis=1), 0.0))
 
 
 def _orders(scaled: _Floats, state: RigState) -> list[float]:
@@ -88,12 +87,12 @@ def _orders(scaled: _Floats, state: RigState) -> list[float]:
     turned = float(np.ptp(angle)) * (1.0 + 1e-4)
     if turned < _LEAST_TURNED:
         return []
-    bins = int(2 ** np.ceil(np.log2(max(turned / (2.0 * np.pi) * _HIGHEST_ORDER * _PADDED, 1024.0))))
+    bins = int(2 ** np.ceil(np.log2(max(turned / (2.0 * np.pi) * LOCATED.highest_order * _PADDED, 1024.0))))
     folded = np.zeros((_PADDED * bins, scaled.shape[1]))
     np.add.at(folded, ((angle - angle.min()) / turned * bins).astype(int), scaled * rate[:, None])
     power = np.sum(np.abs(np.fft.rfft(folded, axis=0)) ** 2, axis=1)
     order = np.arange(len(power)) * 2.0 * np.pi / (_PADDED * turned)
-    return _peaks(order, np.where((order > _LEAST_ORDER) & (order < _HIGHEST_ORDER), power, 0.0))
+    return _peaks(order, np.where((order > LOCATED.lowest_order) & (order < LOCATED.highest_order), power, 0.0))
 
 
 def _peaks(axis: NDArray[Any], power: NDArray[Any]) -> list[float]:

@@ -79,7 +79,7 @@ def made_diagnosis(verdict: str = "explained", *, seed: int = 1) -> Diagnosis:
             pattern="all",
             series=(),
             dependence="f(omega)",
-            text="the reference reads otherwise than the table turns, as a function of the rate (+0.03 rad/s at 6 rad/s)",
+            text="the reference reads otherwise than the table turns, as a function of the rate (+0.03 rad/s)",
             place_probability=0.88,
             log_odds=230.0,
             instead=("the axis tilts in the room, always",),

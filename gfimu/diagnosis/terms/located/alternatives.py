@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
 from gfimu.array.array import AccelerometerArray
-from gfimu.diagnosis.data.added import RigState
+from gfimu.diagnosis.data.table.rig_state import RigState
 from gfimu.diagnosis.terms.located.dependences import (
     Dependence,
     Form,
@@ -24,6 +24,7 @@ from gfimu.diagnosis.terms.located.dependences import (
     curve_over,
 )
 from gfimu.diagnosis.terms.located.operators import channel_place, rig_places
+from gfimu.diagnosis.terms.located.policy import LOCATED
 from gfimu.diagnosis.terms.located.term import LocatedTerm
 
 __all__ = ["ChannelTerms", "channel_patterns", "channel_terms", "chip_groups", "dependences", "rig_terms"]
@@ -31,9 +32,7 @@ __all__ = ["ChannelTerms", "channel_patterns", "channel_terms", "chip_groups", "
 _Floats = NDArray[np.float64]
 ChannelPattern = tuple[str, str, tuple[tuple[int, ...], ...], tuple[str, ...]]
 """Place of the contract, pattern, groups of channels that share an error, and names of the groups."""
-_MODES_HZ = np.geomspace(2.5, 40.0, 15)  # numerical: grid of the frequencies of modes
 _FASTEST = 0.4  # numerical: share of the sample rate up to which a mode is sampled
-_WARMED = 0.2  # K: by choice, of a temperature that changes at all
 
 RATE = Regressor("omega", "the rate", "rad/s", lambda state: state.spin.rate)
 ACCELERATION = Regressor("alpha", "the angular acceleration", "rad/s²", lambda state: state.spin.acceleration)
@@ -106,15 +105,15 @@ def dependences(states: Sequence[RigState]) -> dict[str, Dependence]:
         Form("theta", "theta", "in proportion to the angle turned", ANGLE, lambda x: x - first, turned),
         Form("t", "t", "in proportion to time", TIME, np.asarray, float(seen["t"].max()), None, of_one_recording=True),
     ]
-    lengths = (0.15, 0.5, 1.5)
+    lengths, of_two = LOCATED.lengths, (LOCATED.product_functions, (LOCATED.product_length,))
     curves = [
-        curve_over(RATE, seen["omega"], 16, lengths, warp=slow),
-        curve_over(ACCELERATION, seen["alpha"], 12, lengths, warp=usual),
-        curve_over(ANGLE, seen["theta"], 12, lengths),
-        curve_over(TIME, seen["t"], 24, (0.05, 0.2, 0.7)),
+        curve_over(RATE, seen["omega"], LOCATED.rate_functions, lengths, warp=slow),
+        curve_over(ACCELERATION, seen["alpha"], LOCATED.acceleration_functions, lengths, warp=usual),
+        curve_over(ANGLE, seen["theta"], LOCATED.angle_functions, lengths),
+        curve_over(TIME, seen["t"], LOCATED.time_functions, LOCATED.time_lengths),
         Product(
-            curve_over(RATE, seen["omega"], 7, (0.5,), warp=slow),
-            curve_over(ACCELERATION, seen["alpha"], 7, (0.5,), warp=usual),
+            curve_over(RATE, seen["omega"], *of_two, warp=slow),
+            curve_over(ACCELERATION, seen["alpha"], *of_two, warp=usual),
         ),
         Revolution("revolution", lambda state: np.ones_like(state.t)),
         Revolution("revolution |omega|", lambda state: np.abs(state.spin.rate) / rate),
@@ -130,12 +129,12 @@ def _of_temperature(states: Sequence[RigState]) -> list[Dependence]:
         return []
     seen = np.concatenate([_temperature(state) for state in states])
     first, spread = float(seen[0]), float(np.ptp(seen))
-    if not spread > _WARMED:
+    if not spread > LOCATED.warmed:
         return []
     steep = max(float(np.std(np.concatenate([_warming(state) for state in states]))), 1e-9)
     return [
         Form("T", "T", "in proportion to the temperature", TEMPERATURE, lambda x: x - first, spread),
-        curve_over(TEMPERATURE, seen, 6, (0.3, 1.0)),
+        curve_over(TEMPERATURE, seen, LOCATED.temperature_functions, LOCATED.temperature_lengths),
         Form("dT/dt", "T", "in proportion to the warming", _WARMING, np.asarray, steep),
         LowPassed(TEMPERATURE, first, spread),
     ]
@@ -175,7 +174,8 @@ def rig_terms(states: Sequence[RigState], every: dict[str, Dependence], *, is_an
 
 
 def _modes(states: Sequence[RigState], regressors: Sequence[Regressor], outputs: tuple[int, ...]) -> list[Mode]:
-    slow = _MODES_HZ[_FASTEST / states[0].period > _MODES_HZ]
+    grid = np.geomspace(*LOCATED.mode_hz, LOCATED.modes)
+    slow = grid[grid * states[0].period < _FASTEST]
     return [Mode(one, _largest(states, one), float(hz), outputs) for one in regressors for hz in slow]
 
 

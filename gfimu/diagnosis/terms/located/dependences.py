@@ -18,7 +18,8 @@ from scipy.interpolate import BSpline
 from scipy.signal import cont2discrete, lfilter, ss2tf
 
 from gfimu.base.units import STANDARD_GRAVITY
-from gfimu.diagnosis.data.added import RigState
+from gfimu.diagnosis.data.table.rig_state import RigState
+from gfimu.diagnosis.terms.located.policy import LOCATED
 
 __all__ = [
     "Curve",
@@ -36,7 +37,9 @@ __all__ = [
 ]
 
 _Floats = NDArray[np.float64]
-_STILL = 0.05  # numerical: rad/s
+_ROUGH = 0.01  # numerical: share of a filter that is independent from lag to lag
+_FORGOTTEN = 3.0  # numerical: time constants after which a mode has forgotten
+_FASTER = 0.15  # numerical: logarithm of the frequency between two points of the grid of modes
 _LEAST_PRIOR = 1e-6  # numerical: share of the variance below which the prior hardly allows a combination
 
 
@@ -229,7 +232,7 @@ class Revolution(Dependence):
 
     name: str
     envelope: Callable[[RigState], _Floats]
-    harmonics: int = 8
+    harmonics: int = LOCATED.harmonics
     kind: str = "revolution"
     words: str = "by the angle within a revolution"
 
@@ -266,7 +269,7 @@ class Wave(Dependence):
     apart: float
     of_time: bool = False
     fastest: float = 0.0
-    looks: float = 6.0
+    looks: float = LOCATED.wave_looks
 
     @property
     def name(self) -> str:  # type: ignore[override]
@@ -301,14 +304,16 @@ class Wave(Dependence):
 
     def near(self, width: float) -> list[Dependence]:
         """Return dependences of another shape nearby."""
-        steps = np.array([-1.0, -0.5, 0.5, 1.0]) * width * self.apart
+        steps = np.linspace(-1.0, 1.0, 5) * width * self.apart
         return [replace(self, cycles=self.cycles + float(step)) for step in steps]
 
     def values(self, state: RigState) -> _Floats:
         """Return the functions at the samples."""
         phase = self.cycles * (2.0 * np.pi * state.t if self.of_time else state.spin.angle)
         speed = np.abs(state.spin.rate)
-        envelope = speed / self.fastest if self.fastest else np.where(self.of_time | (speed > _STILL), 1.0, 0.0)
+        envelope = (
+            speed / self.fastest if self.fastest else np.where(self.of_time | (speed > LOCATED.turning), 1.0, 0.0)
+        )
         return np.asarray(np.column_stack([np.cos(phase), np.sin(phase)]) * envelope[:, None])
 
 
@@ -318,7 +323,7 @@ class Memory(Dependence):
 
     regressor: Regressor
     scale: float
-    lags_s: tuple[float, ...] = (0.0, 0.01, 0.02, 0.03, 0.05, 0.08, 0.12, 0.2, 0.3)
+    lags_s: tuple[float, ...] = LOCATED.lags_s
 
     @property
     def name(self) -> str:  # type: ignore[override]
@@ -344,7 +349,7 @@ class Memory(Dependence):
     def roots(self) -> tuple[_Floats, ...]:  # type: ignore[override]
         """Roots of the prior covariance, one for each length scale."""
         lags = np.array(self.lags_s)
-        return np.hstack([_covariance_root(lags, 0.02), 0.01 * np.eye(len(lags))]), np.eye(len(lags))
+        return np.hstack([_covariance_root(lags, LOCATED.lag_length_s), _ROUGH * np.eye(len(lags))]), np.eye(len(lags))
 
     def values(self, state: RigState) -> _Floats:
         """Return the functions at the samples."""
@@ -359,7 +364,7 @@ class LowPassed(Dependence):
     regressor: Regressor
     first: float
     scale: float
-    times_s: tuple[float, ...] = (5.0, 20.0, 60.0)
+    times_s: tuple[float, ...] = LOCATED.filter_times_s
 
     @property
     def name(self) -> str:  # type: ignore[override]
@@ -396,8 +401,8 @@ class Mode(Dependence):
     scale: float
     frequency_hz: float
     outputs: tuple[int, ...] = (0, 1, 2)
-    damping: float = 0.07
-    looks: float = 4.0
+    damping: float = LOCATED.damping
+    looks: float = LOCATED.mode_looks
 
     @property
     def name(self) -> str:  # type: ignore[override]
@@ -416,14 +421,14 @@ class Mode(Dependence):
 
     def near(self, width: float) -> list[Dependence]:
         """Return dependences of another shape nearby."""
-        faster, damped = np.exp(0.15 * width * np.arange(-2, 3)), np.exp(width * np.arange(-1, 2))
+        faster, damped = np.exp(_FASTER * width * np.arange(-2, 3)), np.exp(width * np.arange(-1, 2))
         pairs = [(self.frequency_hz * f, self.damping * z) for f in faster for z in damped]
         return [replace(self, frequency_hz=float(f), damping=float(min(z, 1.0))) for f, z in pairs]
 
     @property
     def memory_s(self) -> float:  # type: ignore[override]
         """How long it remembers the drive, s."""
-        return 3.0 / (2.0 * np.pi * self.frequency_hz * self.damping)
+        return _FORGOTTEN / (2.0 * np.pi * self.frequency_hz * self.damping)
 
     @property
     def roots(self) -> tuple[_Floats, ...]:
@@ -460,7 +465,15 @@ class OfReading(Dependence):
     def _curve(self) -> Curve:
         reading = Regressor("y", "the reading", "m/s²", lambda state: state.t)
         return Curve(
-            self.name, self.kind, self.words, reading, -self.most, self.most, 10, (0.15, 0.5, 1.5), self.most / 8.0
+            self.name,
+            self.kind,
+            self.words,
+            reading,
+            -self.most,
+            self.most,
+            LOCATED.reading_functions,
+            LOCATED.lengths,
+            self.most / LOCATED.harmonics,
         )
 
     @property

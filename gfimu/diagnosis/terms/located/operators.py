@@ -24,11 +24,12 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.diagnosis.data.added import RigState
+from gfimu.diagnosis.data.table.rig_state import RigState
+from gfimu.diagnosis.terms.located.policy import LOCATED
 
 __all__ = ["Operator", "Place", "channel_place", "rig_places"]
 
-_Z = np.array([0.0, 0.0, 1.0])
+_Z = np.array([0.0, 0.0, 1.0])  # numerical: the axis of the table
 _Floats = NDArray[np.float64]
 _Groups = tuple[tuple[int, ...], ...]
 
@@ -86,21 +87,20 @@ class Place:
 
 def rig_places(*, is_angle: bool) -> dict[str, Place]:
     """Return the places in the rig, by what the error there is; ``is_angle`` of a reference that is an angle."""
-    read = "rad" if is_angle else "rad/s"
+    read, usual = "rad" if is_angle else "rad/s", LOCATED
+    x, xy, xyz = ("",), ("x", "y"), ("x", "y", "z")
+    late, turns = partial(_is_late, is_angle), partial(_turns, is_angle)
     places = (
-        Place("reference", "reads", "the reference reads otherwise than the table turns", read, 0.05, ("",), _reads),
-        Place("clock", "late", "the reference is late", "s", 5e-3, ("",), partial(_is_late, is_angle)),
-        Place(
-            *("motion", "turns", "the table turns otherwise than the drive is modelled", "rad", 5e-3, ("",)),
-            partial(_turns, is_angle),
-        ),
-        Place("array", "leans", "the array leans on the table", "rad", 2e-3, ("x", "y"), _leans),
-        Place("array", "moves", "the array moves on the table", "m", 1e-3, ("x", "y", "z"), _moves),
-        Place("array", "stretches", "the array stretches away from the axis", "1", 5e-3, ("",), _stretches),
-        Place("array", "vibrates", "the array vibrates with the table", "m/s²", 0.05, ("x", "y", "z"), _vibrates),
-        Place("bench", "shakes", "the bench shakes", "m/s²", 0.05, ("x", "y", "z"), _shakes),
-        Place("bench", "tilts", "the axis tilts in the room", "rad", 2e-3, ("x", "y"), _tilts),
-        Place("supply", "gain", "the gain of all channels changes", "1", 5e-3, ("",), _gain_of_all),
+        Place("reference", "reads", "the reference reads otherwise than the table turns", read, usual.reads, x, _reads),
+        Place("clock", "late", "the reference is late", "s", usual.late_s, x, late),
+        Place("motion", "turns", "the table turns otherwise than its drive", "rad", usual.turns_rad, x, turns),
+        Place("array", "leans", "the array leans on the table", "rad", usual.leans_rad, xy, _leans),
+        Place("array", "moves", "the array moves on the table", "m", usual.moves_m, xyz, _moves),
+        Place("array", "stretches", "the array stretches away from the axis", "1", usual.ratio, x, _stretches),
+        Place("array", "vibrates", "the array vibrates with the table", "m/s²", usual.shakes_m_s2, xyz, _vibrates),
+        Place("bench", "shakes", "the bench shakes", "m/s²", usual.shakes_m_s2, xyz, _shakes),
+        Place("bench", "tilts", "the axis tilts in the room", "rad", usual.leans_rad, xy, _tilts),
+        Place("supply", "gain", "the gain of all channels changes", "1", usual.ratio, x, _gain_of_all),
     )
     return {place.what: place for place in places}
 
@@ -241,8 +241,8 @@ def _delay(groups: _Groups, state: RigState) -> list[Operator]:
 
 
 _CHANNEL_KINDS: dict[str, tuple[str, str, float, Callable[[_Groups, RigState], Sequence[Operator]]]] = {
-    "offset": ("the offset of {} changes", "m/s²", 0.05, _offset),
-    "gain": ("the gain of {} changes", "1", 5e-3, _gain),
-    "delay": ("the sampling of {} is late", "s", 5e-3, _delay),
+    "offset": ("the offset of {} changes", "m/s²", LOCATED.shakes_m_s2, _offset),
+    "gain": ("the gain of {} changes", "1", LOCATED.ratio, _gain),
+    "delay": ("the sampling of {} is late", "s", LOCATED.late_s, _delay),
 }
 """Errors of channels: words, unit, usual size, operators."""

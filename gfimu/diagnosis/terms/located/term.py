@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from gfimu.array.array import AccelerometerArray
-from gfimu.diagnosis.data.added import AddedEffect, RigState
+from gfimu.diagnosis.data.table.rig_state import AddedEffect, RigState
 from gfimu.diagnosis.terms.cause import Cause
 from gfimu.diagnosis.terms.columns import Columns
 from gfimu.diagnosis.terms.located.dependences import Dependence

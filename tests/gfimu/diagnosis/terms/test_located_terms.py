@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 
 from gfimu import AccelerometerArray
-from gfimu.diagnosis import LocatedEffect, LocatedTerm, RigState, channel_place, dependences, located_columns, rig_places
+from gfimu.diagnosis import (
+    LocatedEffect,
+    LocatedTerm,
+    RigState,
+    channel_place,
+    dependences,
+    located_columns,
+    rig_places,
+)
 from sim.effects import make_effect
 from sim.trials import random_profile
 from sim.twin import Twin
