@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from gfimu.diagnosis.data.time_grid import time_grid
     from gfimu.diagnosis.design.run_check import check_runs, turns_one_way
     from gfimu.diagnosis.diagnose import prepare
+    from gfimu.diagnosis.fit.gauss_newton import fit
     from gfimu.diagnosis.fit.learn import predicted_by_reference, starting_point
     from gfimu.diagnosis.one_library import stretches_of
     from gfimu.diagnosis.policy import Policy
@@ -40,14 +41,19 @@ if TYPE_CHECKING:
     from gfimu.diagnosis.report.plain_words import headline, next_steps, story
     from gfimu.diagnosis.report.rig import DrawnRig
     from gfimu.diagnosis.report.tables import diagnosis_tables
+    from gfimu.diagnosis.search.free_time import free_time
     from gfimu.diagnosis.search.localise import localise
+    from gfimu.diagnosis.search.located_screen import LocatedScreen
     from gfimu.diagnosis.search.long_run import spread_over_runs, understand_any_length
+    from gfimu.diagnosis.search.waves import signal_of
     from gfimu.diagnosis.terms.cause import Cause, effects_of, mixing_of
     from gfimu.diagnosis.terms.columns import Columns
     from gfimu.diagnosis.terms.drive import Drive
     from gfimu.diagnosis.terms.library import cause_columns, family_columns
     from gfimu.diagnosis.terms.located.alternatives import dependences
-    from gfimu.diagnosis.terms.located.operators import channel_place, rig_places
+    from gfimu.diagnosis.terms.located.dependences import Wave
+    from gfimu.diagnosis.terms.located.operators import Operator, channel_place, rig_places
+    from gfimu.diagnosis.terms.located.policy import LOCATED
     from gfimu.diagnosis.terms.located.term import LocatedEffect, LocatedTerm, located_columns
     from gfimu.diagnosis.terms.observed import observe
     from gfimu.diagnosis.terms.reach import behind_wiring, disjoint

@@ -63,6 +63,8 @@ def free_time(stretches: Sequence[Stretch], fitted: Fit, policy: Policy) -> list
             chosen = float(np.log(len(directions)))  # each component that it takes
             gains = [_gained(residual, one * np.sqrt(weights), stretch.run.sample_period) for one in directions]
             value = sum(max(gain - chosen, 0.0) for gain in gains)
+            if pattern == "own":  # it can do all that others do; the drive spreads a little of these over all channels
+                value *= 1.0 - policy.small
             label = f"{where.what} {where.components}"
             before = totals[label].log_odds if label in totals else 0.0
             totals[label] = FreeTime(before + value, where, pattern)

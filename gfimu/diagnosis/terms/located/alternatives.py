@@ -39,7 +39,8 @@ ACCELERATION = Regressor("alpha", "the angular acceleration", "rad/s²", lambda 
 ANGLE = Regressor("theta", "the angle turned", "rad", lambda state: state.spin.angle)
 TIME = Regressor("t", "time", "s", lambda state: state.t)
 _NOTHING = Regressor("1", "nothing", "", lambda state: np.ones_like(state.t))
-_SQUARE = Regressor("omega^2", "the rate squared", "rad²/s²", lambda state: state.spin.rate**2)
+_SQUARE = Regressor("omega^2", "the rate squared", "rad²/s²", lambda state: state.spin.rate**2)  # numerical: a square
+# Numerical: squares.
 _FORCES = tuple(
     Regressor(f"the rotating force {axis}", "the force that turns with the table", "rad²/s²", force)
     for axis, force in (
@@ -159,6 +160,7 @@ _OF_PLACE = {
     "tilts": ("1", *_OF_RIG),
     "gain": ("1", *_OF_RIG, "f(omega, alpha)", "t"),
 }
+# Numerical: places of outputs.
 _MODES_OF_PLACE = {"reads": (0, 1, 2), "leans": (0,), "moves": (0,), "shakes": (2,), "tilts": (0,)}
 """What of a mode an error there may follow: displacement, velocity, acceleration."""
 

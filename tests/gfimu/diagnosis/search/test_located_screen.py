@@ -9,14 +9,19 @@ import pytest
 from few_effects import having
 
 from gfimu import AccelerometerArray
-from gfimu.diagnosis import Policy, prepare, starting_point, stretches_of
-from gfimu.diagnosis.fit.gauss_newton import fit
-from gfimu.diagnosis.search.free_time import free_time
-from gfimu.diagnosis.search.located_screen import LocatedScreen
-from gfimu.diagnosis.search.waves import signal_of
-from gfimu.diagnosis.terms.located.dependences import Wave
-from gfimu.diagnosis.terms.located.operators import Operator
-from gfimu.diagnosis.terms.located.policy import LOCATED
+from gfimu.diagnosis import (
+    LOCATED,
+    LocatedScreen,
+    Operator,
+    Policy,
+    Wave,
+    fit,
+    free_time,
+    prepare,
+    signal_of,
+    starting_point,
+    stretches_of,
+)
 from sim.trials import Measurement, measure
 from sim.twin import Twin
 

@@ -25,8 +25,10 @@ def test_the_parts_write_themselves_as_the_contract_has_them():
     assert written["residual"]["after_by_channel"] == pytest.approx(dict(found.residual.after_by_channel))
     assert written["gain"]["held_out_rms_before"] == pytest.approx(found.gain.rms_before, nan_ok=True)
     assert written["unexplained"]["surrogate"] == dict(found.unexplained.surrogate)
+    (located,) = written["unexplained"]["located"]
+    assert (located["effect"], located["place"], located["function"]["x_unit"]) == ("unlisted", "reference", "rad/s")
     assert set(written["unexplained"]) == {
-        "significant", "signature", "log_odds", "surrogate", "extends_twin", "left_out", "mistake",
+        "significant", "signature", "log_odds", "surrogate", "extends_twin", "left_out", "located", "mistake",
     }  # fmt: skip
 
 
