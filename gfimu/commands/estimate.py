@@ -52,7 +52,6 @@ _NOISE = Option(
     "Standard deviation of one sample of each channel, scalar or (c,), m/s²; by default from the parts' data sheets.",
     shell=False,
 )
-_PROGRESS = Option("Called with the share done, 0 to 1.", shell=False)
 
 
 @dataclass(frozen=True)
@@ -111,7 +110,7 @@ def estimate(
     omega0: Annotated["ArrayLike", _OMEGA] = (0.0, 0.0, 0.0),
     quaternion0: Annotated["ArrayLike | None", _QUATERNION] = None,
     noise_std: Annotated["ArrayLike | None", _NOISE] = None,
-    progress: Annotated[Callable[[float], object] | None, _PROGRESS] = None,
+    progress: Annotated[Callable[[float], object] | None, options.SHARE] = None,
 ) -> _EstimatedRun:
     """Estimate p, α, ω, attitude and table angle at every sample of a recording.
 

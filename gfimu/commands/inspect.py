@@ -36,15 +36,7 @@ _FILE = Option(
 )
 
 
-def _results() -> tuple[type, ...]:
-    from gfimu.recording.importing import Inspection
-
-    return (Inspection,)
-
-
-@command(
-    results=_results, report=lambda found, values: _Report(found, values["out"] is None), doing="looking at the file"
-)
+@command(report=lambda found, values: _Report(found, values["out"] is None), doing="looking at the file")
 def inspect(
     file: Annotated[given.Run, _FILE],
     *,

@@ -15,16 +15,13 @@ gfimu live --from socket://pi:4000 --array wheel.toml --axis z --hub free --unkn
 
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from gfimu.base.errors import InputError
+from gfimu.commands import given
 from gfimu.commands.known_axis import AXIS_ALONE, AxisLike, as_known_axis
 from gfimu.commands.shell.declare import Option, command
-from gfimu.commands.shell.options import ARRAY, BIAS_STD_M_S2, FORCE, GYRO, KEEP_FAULTY, MAX_MEMORY, RATE, UNKNOWN_START
-
-if TYPE_CHECKING:
-    from gfimu.array.array import AccelerometerArray
-    from gfimu.base.files.memory import MemorySize
+from gfimu.commands.shell.options import ARRAY, BIAS_STD_M_S2, FORCE, GYRO, KEEP_FAULTY, RATE, UNKNOWN_START
 
 __all__ = ["live"]
 
@@ -44,18 +41,18 @@ def _results() -> tuple[type, ...]:
     return (LiveSample, SkippedLine, HealthEvent)
 
 
-def _print_lines(given: Mapping[str, Any], as_json: bool) -> None:
+def _print_lines(values: Mapping[str, Any], as_json: bool) -> None:
     """Print the lines as they come: each is JSON in any case; with --json an error is one too."""
     from gfimu.commands.shell.stop_signals import write_line
 
     del as_json
-    for line in live(**given):
+    for line in live(**values):
         write_line(line)
 
 
 @command(results=_results, run=_print_lines)
 def live(
-    array: Annotated["AccelerometerArray | str | Path | None", ARRAY.also("; else the stream's own")] = None,
+    array: Annotated[given.Array, ARRAY.also("; else the stream's own")] = None,
     rate: Annotated[float | None, RATE.also(", nominal; else the stream's own")] = None,
     *,
     source: Annotated["str | Path | Iterable[str]", _FROM] = "-",
@@ -66,7 +63,7 @@ def live(
     gyro: Annotated[bool, GYRO] = False,
     axis: Annotated[AxisLike, AXIS_ALONE] = None,
     keep_faulty: Annotated[bool, KEEP_FAULTY] = False,
-    max_memory: Annotated["MemorySize | None", MAX_MEMORY] = None,
+    max_memory: given.Memory = None,
     force: Annotated[bool, FORCE] = False,
 ) -> Iterator[str]:
     """Estimate the angular rate while samples arrive: CSV lines in, one JSON line per sample out.

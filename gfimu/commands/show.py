@@ -18,10 +18,10 @@ from typing import TYPE_CHECKING, Annotated
 
 from gfimu.base.declared import Declared, FileText, figure
 from gfimu.base.errors import InputError, unknown_name
+from gfimu.commands import given
 from gfimu.commands.list import catalogue
 from gfimu.commands.shell import completion
 from gfimu.commands.shell.declare import Option, command
-from gfimu.commands.shell.options import MAX_MEMORY
 
 if TYPE_CHECKING:
     from gfimu.base.files.memory import MemorySize
@@ -47,8 +47,8 @@ class Shown(Declared):
         yield FileText(self.text)
 
 
-@command(report=lambda text, given: Shown(given["name"], text), results=lambda: (Shown,))
-def show(name: Annotated[str, _NAME], *, max_memory: Annotated["MemorySize | None", MAX_MEMORY] = None) -> str:
+@command(report=lambda text, values: Shown(values["name"], text), results=lambda: (Shown,))
+def show(name: Annotated[str, _NAME], *, max_memory: given.Memory = None) -> str:
     """Return the text of a shipped file, of a file of your own, of the array in a recording, or of an effect.
 
     A file of one's own is checked; of a recording the array file is returned.

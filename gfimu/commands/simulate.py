@@ -13,13 +13,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from gfimu.base.errors import InputError
+from gfimu.commands import given
 from gfimu.commands.shell.declare import Option, command
 from gfimu.commands.shell.options import MAX_MEMORY, RECORDING_OUT, RRD, SCENARIO, SEED, SHARE
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from gfimu.base.files.memory import MemorySize
     from gfimu.recording import Recording
     from sim.scenarios import Scenario
     from sim.simulation import Simulated
@@ -34,7 +34,7 @@ def _recording(simulated: "Simulated") -> "Recording":
     return simulated.recording
 
 
-@command(gives=_recording, doing=lambda given: f"simulating {given['scenario']}")
+@command(gives=_recording, doing=lambda values: f"simulating {values['scenario']}")
 def simulate(
     scenario: Annotated["Scenario | str | Path", SCENARIO.also(" or a twin file", argument=True)],
     *,
@@ -42,7 +42,7 @@ def simulate(
     seed: Annotated[int, SEED] = 0,
     changes: Annotated["Sequence[str]", _CHANGES] = (),
     raw: Annotated[bool, _RAW] = False,
-    max_memory: Annotated["MemorySize | None", MAX_MEMORY.also("; of the run, half of the machine's")] = None,
+    max_memory: Annotated[given.Memory, MAX_MEMORY.also("; of the run, half of the machine's")] = None,
     rrd: Annotated["str | Path | None", RRD] = None,
     progress: Annotated["Callable[[float], None] | None", SHARE] = None,
 ) -> "Simulated":

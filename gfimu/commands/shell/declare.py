@@ -304,7 +304,7 @@ def command(name: str = "", **settings: Any) -> Any:
     """Return the decorator that makes a function a command; the settings are those of `Command`."""
 
     def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
-        results = functools.partial(_returned_results, settings.get("report") or function)
+        results = functools.partial(_returned_results, settings.get("report"), function)
         declared = Command(name or function.__name__, function, **{"results": results, **settings})
         signature = inspect.signature(function)
 
@@ -358,12 +358,19 @@ def choices_of(parameter: inspect.Parameter) -> tuple[Any, ...]:
     return next((get_args(one) for one in kinds if get_origin(one) is Literal), ())
 
 
-def _returned_results(function: Callable[..., Any]) -> tuple[type[Declared], ...]:
-    """Return the results that the return annotation of a function names, which its file may import for types only."""
-    names = re.findall(r"\w+", str(inspect.signature(function).return_annotation))
-    load, _, imported = declared_names(function.__module__)
-    kinds = [load(name) for name in names if name in imported]
-    return tuple(kind for kind in kinds if isinstance(kind, type) and issubclass(kind, Declared))
+def _returned_results(*functions: Callable[..., Any] | None) -> tuple[type[Declared], ...]:
+    """Return the results that the return annotation of the first function names that names any.
+
+    They stand in the file of the function, which may import them for types only.
+    """
+    for function in filter(None, functions):
+        names = re.findall(r"\w+", str(inspect.signature(function).return_annotation))
+        module = inspect.getmodule(function)
+        load, _, imported = declared_names(function.__module__)
+        kinds = [load(name) if name in imported else vars(module).get(name) for name in names]
+        if results := tuple(kind for kind in kinds if isinstance(kind, type) and issubclass(kind, Declared)):
+            return results
+    return ()
 
 
 def _plain_signature(signature: inspect.Signature, gives: Callable[[Any], Any] | None) -> inspect.Signature:
