@@ -136,9 +136,11 @@ def optimize(
     source = np.random.default_rng(wanted.seed) if rng is None else rng
     starts = wanted.starts
     if pareto is not None and front is not None:
+        from gfimu.array_search.pictures import write_front
+
         most = most_chips or problem.n_chips + _MORE_CHIPS
         arrays = find_front(problem, conditions, pareto, source, most_chips=most, starts=starts, report=progress)
-        _write_front(Path(front), arrays)
+        write_front(front, arrays)
         return arrays
     goal = named(wanted.objective.name, problem, conditions)
     name = name or ("" if out is None else Path(out).stem)
@@ -172,20 +174,3 @@ def _sites(wanted: "BriefFile", brief: str | Path | None) -> "Sites | None":
             f"[volume] file = {table.file!r}: candidate sites come from .xml, .toml or .csv; use one of them"
         )
     return sites_of_csv(path)
-
-
-def _write_front(folder: Path, found: "Front") -> None:
-    import json
-
-    from gfimu.array_search.pictures import front_picture
-    from gfimu.base.files.atomic_file import write_text
-
-    folder.mkdir(exist_ok=True)
-    for point in found.points:
-        write_text(folder / f"{point.name}.toml", point.array.to_toml())
-    write_text(folder / "front.json", json.dumps(found.to_dict(), indent=2) + "\n")
-    front_picture(folder / "front.png", found)
-    written = {f"{point.name}.toml" for point in found.points}
-    for file in folder.glob("front_[0-9][0-9].toml"):  # of the front that this one replaces, which had more points
-        if file.name not in written:
-            file.unlink()
