@@ -90,10 +90,10 @@ def live(
     >>> for line in gfimu.live("cube12", 100.0, source=lines):  # doctest: +SKIP
     ...     print(line)
     """
-    import numpy as np
-
     from gfimu.commands.opened import as_array
+    from gfimu.rate.health.live.watched_filter import WatchedRateFilter
     from gfimu.rate.kalman import FilterSettings
+    from gfimu.rate.live import LiveRateFilter
     from gfimu.rate.sensing import SensorErrors, calibrated_bias_std
     from gfimu.rate.stream import examined_lines, filter_stream, read_head
     from gfimu.recording.carried_array import carried_array
@@ -120,15 +120,10 @@ def live(
     bias = calibrated_bias_std(metadata, geometry) if bias_std_m_s2 is None else bias_std_m_s2
     biases: dict[str, Any] = {} if bias is None else {"bias_std": bias}
     errors = SensorErrors.from_parts(geometry, rate, scale_std=scale_std, **biases)
-    settings = FilterSettings(start_omega=None) if unknown_start else FilterSettings(start_omega=np.zeros(3))
+    settings = FilterSettings(start_omega=None) if unknown_start else FilterSettings()
     watched = None
     if not keep_faulty:
-        from gfimu.rate.health.live.channel_watch import LiveWatch
-        from gfimu.rate.health.live.watched_filter import WatchedRateFilter
-        from gfimu.rate.live import LiveRateFilter
-
-        live = LiveRateFilter(geometry, errors, 1.0 / rate, settings, gyro=gyro)
         is_sure = scale_std > 0.0 or "calibration" in metadata
-        stated = errors if is_sure else errors.with_part_gains(geometry)
-        watched = WatchedRateFilter(live, LiveWatch(geometry, stated, 1.0 / rate, at_rest=not unknown_start))
+        live = LiveRateFilter(geometry, errors, 1.0 / rate, settings, gyro=gyro)
+        watched = WatchedRateFilter.of(live, errors, calibrated=is_sure, at_rest=not unknown_start)
     return filter_stream(lines, geometry, errors, 1.0 / rate, settings, fuse_gyro=gyro, watched=watched)
