@@ -16,15 +16,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from gfimu.array.gravity import Latitude
 from gfimu.base.errors import InputError
+from gfimu.calibration.given import CalibrationPoses, CalibrationPrior, RateTable
 from gfimu.commands import given
+from gfimu.commands.opened import as_array, as_calibrated_run, as_calibration, as_source, name_of
 from gfimu.commands.shell import completion, options
 from gfimu.commands.shell.declare import Group, Option, command
 from gfimu.commands.shell.output_files import CALIBRATION
 
 if TYPE_CHECKING:
-    from gfimu.array.gravity import Latitude
-    from gfimu.calibration.given import CalibrationPoses, CalibrationPrior, RateTable
     from gfimu.calibration.method import CalibrationMethod
     from gfimu.calibration.result import Calibration
     from gfimu.recording import Recording
@@ -63,9 +64,7 @@ def _gravity_of(
     gravity: Annotated[float | None, options.GRAVITY] = None,
     latitude: Annotated[float | None, options.LATITUDE.also(": gravity from it")] = None,
     height: Annotated[float, Option("Height above the ellipsoid, m.")] = 0.0,
-) -> "Latitude | float | None":
-    from gfimu.array.gravity import Latitude
-
+) -> Latitude | float | None:
     if gravity is not None and latitude is not None:
         raise InputError("give --gravity or --latitude, not both")
     return gravity if latitude is None else Latitude(latitude, height)
@@ -90,9 +89,7 @@ def _poses_of(
     rest_threshold: Annotated[float | None, options.REST_THRESHOLD] = None,
     min_rest: Annotated[float | None, Option("Shortest pose, s; 1 by default, 2 for array.")] = None,
     levelling_std: Annotated[float | None, Option("Standard deviation of a pose's tilt per axis, rad.")] = None,
-) -> "CalibrationPoses":
-    from gfimu.calibration.given import CalibrationPoses
-
+) -> CalibrationPoses:
     stated = {"level": wavelet_level, "threshold": wavelet_threshold}
     wavelet = {key: value for key, value in stated.items() if value is not None}
     return CalibrationPoses(rest_threshold, min_rest, levelling_std, input_kind, wavelet)
@@ -113,9 +110,7 @@ def _prior_of(
     calibration: Annotated[Path | None, _START] = None,
     radius_std: Annotated[float | None, _RADIUS] = None,
     stretch_std: Annotated[float | None, _STRETCH] = None,
-) -> "CalibrationPrior":
-    from gfimu.calibration.given import CalibrationPrior
-
+) -> CalibrationPrior:
     return CalibrationPrior(update, calibration, turn_on_std, bias_walk, radius_std, stretch_std)
 
 
@@ -127,9 +122,7 @@ def _rate_table_of(
     rate_table: Annotated[bool, Option("gyro: RUN is of a rate table, whose tachometer is the reference.")] = False,
     also: Annotated[list[Path], _ALSO] = (),  # type: ignore[assignment]
     table_axes: Annotated[str, _AXES] = "",
-) -> "RateTable | None":
-    from gfimu.calibration.given import RateTable
-
+) -> RateTable | None:
     if not (rate_table or also or table_axes):
         return None
     return RateTable(tuple(also), tuple(filter(None, table_axes.split(","))))
@@ -188,14 +181,11 @@ def calibrate(
     >>> gfimu.calibrate("array", poses)
     Calibration(array, 12 channels in m/s², 60 parameters, 3 directions undetermined)
     """
-    from gfimu.array.gravity import Latitude
     from gfimu.base.units import STANDARD_GRAVITY
     from gfimu.calibration.check_poses import check_on_poses
-    from gfimu.calibration.given import CalibrationPoses, CalibrationPrior, RateTable
     from gfimu.calibration.method import CalibrationTask, run_calibration
     from gfimu.calibration.registry import calibration_method
     from gfimu.calibration.run_file import open_references, open_uncalibrated
-    from gfimu.commands.opened import as_array, as_calibrated_run, as_source, name_of
     from gfimu.recording.checks import examine
 
     rests, known = poses or CalibrationPoses(), prior or CalibrationPrior()
@@ -260,10 +250,8 @@ def calibrate(
     return result
 
 
-def _loaded(prior: "CalibrationPrior") -> dict[str, Any]:
+def _loaded(prior: CalibrationPrior) -> dict[str, Any]:
     """Return what is known before, calibrations read from their files; without what the task has a default for."""
-    from gfimu.commands.opened import as_calibration
-
     stated = {name: value for name, value in vars(prior).items() if value is not None}
     return stated | {name: as_calibration(stated[name]) for name in ("update", "start") if name in stated}
 

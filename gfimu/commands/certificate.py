@@ -17,13 +17,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from gfimu.base.files.outputs import OutputFolder
+from gfimu.calibration.certificate.stage.stage import Stage
 from gfimu.commands import given
 from gfimu.commands.shell.declare import Option, command
 from gfimu.commands.shell.options import ARRAY
 
 if TYPE_CHECKING:
     from gfimu.calibration.certificate.certificate import Certificate, Component, Sheet
-    from gfimu.calibration.certificate.stage.stage import Stage
     from gfimu.calibration.result import Calibration
     from gfimu.recording.mapped import RecordingLike
 
@@ -83,7 +83,6 @@ def certificate(
     from gfimu.calibration.certificate.angular import angular_sensor_sheet
     from gfimu.calibration.certificate.comparison import compare as compared
     from gfimu.calibration.certificate.page import write_certificate
-    from gfimu.calibration.certificate.stage.stage import Stage
     from gfimu.commands.opened import as_array, as_calibrated_run, as_calibration, as_source
 
     fitted = as_calibration(calibration)

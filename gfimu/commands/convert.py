@@ -28,7 +28,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from gfimu.base.declared import Declared, Key, Table, figure, figures
 from gfimu.base.errors import InputError, unknown_name
+from gfimu.base.files.atomic_file import write_text
 from gfimu.commands import given
+from gfimu.commands.opened import as_array, as_runs, as_source, files_by_map, name_of
 from gfimu.commands.shell.completion import words
 from gfimu.commands.shell.declare import Option, command
 from gfimu.commands.shell.options import ARRAY, MAP_OF_TABLE
@@ -209,8 +211,6 @@ def convert(
     >>> import gfimu
     >>> gfimu.convert("log.csv", "run.parquet", column_map="phyphox")  # doctest: +SKIP
     """
-    from gfimu.commands.opened import as_array, as_runs
-
     sources = as_runs(source)  # type: ignore[arg-type]
     alone = sources[0] if len(sources) == 1 else None
     drawn = _array(alone, target)
@@ -222,7 +222,6 @@ def convert(
     drawing = None if array is None else as_array(array)
     calibration = _calibration(alone)
     if calibration is not None:
-        from gfimu.base.files.atomic_file import write_text
         from gfimu.calibration.exporting import TARGETS, calibrated_chips, notes_of
         from gfimu.commands.noise import noise as recorded_noise
         from gfimu.sensor_noise import RecordingNoise
@@ -255,7 +254,6 @@ def _read(
     max_memory: "MemorySize | None",
 ) -> "Recording":
     """Return the recording that one source, or a file per chip, holds."""
-    from gfimu.commands.opened import as_source, files_by_map, name_of
     from gfimu.recording.carried_array import carried_array
     from gfimu.recording.checks import examine
     from gfimu.recording.formats import open_recording
@@ -305,7 +303,6 @@ def _write(recording: "Recording", target: Path) -> None:
 
 def _write_array(array: "AccelerometerArray", target: "str | Path | None", rig: str) -> None:
     """Write an array as a MuJoCo model."""
-    from gfimu.base.files.atomic_file import write_text
     from sim.rigs.mjcf_export import array_as_mjcf
 
     if target is not None and Path(target).suffix != ".xml":
@@ -318,7 +315,6 @@ def _write_array(array: "AccelerometerArray", target: "str | Path | None", rig: 
 def _array(source: object, target: "str | Path | None") -> "AccelerometerArray | None":
     """Return the array that is to be converted: one itself, or what is named where the target is a MuJoCo model."""
     from gfimu.array.array import AccelerometerArray
-    from gfimu.commands.opened import as_array
 
     if isinstance(source, AccelerometerArray):
         return source

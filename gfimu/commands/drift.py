@@ -15,10 +15,10 @@ import math
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Annotated, Any
 
-from gfimu.base.errors import InputError
+from gfimu.base.errors import InputError, naming
 from gfimu.commands import given
 from gfimu.commands.known_axis import AXIS_ALONE, AxisLike, KnownAxis, as_known_axis
-from gfimu.commands.opened import as_array
+from gfimu.commands.opened import as_array, as_calibrated_run, as_source, name_of
 from gfimu.commands.shell import options
 from gfimu.commands.shell.declare import Command, Option, command, command_of
 
@@ -82,9 +82,7 @@ def drift_of_rest(
     >>> len(found.start_s) > 1
     True
     """
-    from gfimu.base.errors import naming
     from gfimu.budget.drift.rest_windows import rest_drift
-    from gfimu.commands.opened import as_calibrated_run, as_source, name_of
     from gfimu.recording.checks import examine
 
     source = as_source(recording, array, column_map, max_memory=max_memory)

@@ -19,7 +19,7 @@ from typing import Annotated, Any
 from gfimu.base.declared import Declared, FileText, figure
 from gfimu.base.errors import InputError, unknown_name
 from gfimu.base.files.outputs import OutputFolder
-from gfimu.commands.file_kinds import FILE_KINDS
+from gfimu.commands.file_kinds import FILE_KINDS, file_schema
 from gfimu.commands.shell.completion import words
 from gfimu.commands.shell.declare import Option, command
 from gfimu.commands.shell.output_files import JSON_SCHEMA, TOML_FILE
@@ -92,7 +92,6 @@ def new(
     from gfimu.base.files.atomic_file import write_text
     from gfimu.base.files.model_files import find_model
     from gfimu.base.files.schema import json_schema
-    from gfimu.commands.file_kinds import file_schema
 
     if kind == SENDER:
         if out is not None or schema is not None:

@@ -20,8 +20,6 @@ from gfimu.commands.shell.declare import Option, command
 from gfimu.commands.shell.output_files import KALIBR
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from gfimu.sensor_noise import RecordingNoise
 
 __all__ = ["noise"]

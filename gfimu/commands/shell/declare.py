@@ -11,10 +11,10 @@ import functools
 import inspect
 import re
 import textwrap
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, is_dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal, ParamSpec, Protocol, TypeVar, get_args, get_origin, overload
+from typing import Annotated, Any, Literal, ParamSpec, TypeVar, get_args, get_origin, overload
 
 from gfimu.base.declared import Declared
 from gfimu.base.errors import InputError, did_you_mean, unknown_name
@@ -137,18 +137,6 @@ class Group:
         return found
 
 
-class Shown(Protocol):
-    """What a command prints."""
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return it as JSON holds it."""
-        ...
-
-    def shown(self) -> Iterator[Any]:
-        """Yield tables and sentences."""
-        ...
-
-
 @dataclass(frozen=True)
 class Command:
     """A function with what the shell has to know besides its parameters.
@@ -160,7 +148,8 @@ class Command:
     function : callable
         The function, unchecked.
     report : callable, optional
-        Makes what is printed of the function's result and the arguments; by default the result itself is.
+        Makes what is printed of the function's result and the arguments, by default the result itself: its ``to_dict``
+        is the JSON, its ``shown`` yields tables and sentences.
     results : callable
         Returns the classes of what is printed, for the schema; by default those that the report returns, or the
         function.
@@ -184,7 +173,7 @@ class Command:
 
     name: str
     function: Callable[..., Any]
-    report: Callable[[Any, _Given], Shown] | None = None
+    report: Callable[[Any, _Given], Any] | None = None
     results: Callable[[], tuple[Any, ...]] = tuple
     doing: str | Callable[[_Given], str] = ""
     run: Callable[..., None] | None = None
