@@ -205,6 +205,7 @@ def calibrate(
         examine(read, drawing, source=name_of(item), force=force)
         return read
 
+    others: Recording | None = None
     if "rate_table" in chosen.options:
         if check is not None or picture is not None or drawing is not None or gravity is not latitude:
             raise InputError(
@@ -216,26 +217,23 @@ def calibrate(
         mounted = RateTable(also, table.axes, [name_of(item) for item in files])
         degrees = None if latitude is None else latitude.deg
         task = CalibrationTask(first, latitude_deg=degrees, rate_table=mounted, **vars(rests))
-        result = run_calibration(chosen, task)
-        if out is not None:
-            result.save(out)
-        return result
-    run = checked(recording)
-    turned = None if motion is None else checked(motion)
-    others = None if check is None else checked(check)
-    if others is not None:
-        _refuse_the_same(run, others, name_of(check))
-    carries = drawing is None and "array" in chosen.options
-    task = CalibrationTask(
-        run,
-        gravity=STANDARD_GRAVITY if local_gravity is None else local_gravity,
-        n_parameters=parameters,
-        array=as_calibrated_run(source_of(recording), None)[1] if carries else drawing,
-        motion=turned,
-        progress=progress,
-        **vars(rests),
-        **_loaded(known),
-    )
+    else:
+        run = checked(recording)
+        turned = None if motion is None else checked(motion)
+        others = None if check is None else checked(check)
+        if others is not None:
+            _refuse_the_same(run, others, name_of(check))
+        carries = drawing is None and "array" in chosen.options
+        task = CalibrationTask(
+            run,
+            gravity=STANDARD_GRAVITY if local_gravity is None else local_gravity,
+            n_parameters=parameters,
+            array=as_calibrated_run(source_of(recording), None)[1] if carries else drawing,
+            motion=turned,
+            progress=progress,
+            **vars(rests),
+            **_loaded(known),
+        )
     result = run_calibration(chosen, task)
     if others is not None:
         rested = {} if task.min_rest_s is None else {"min_rest_s": task.min_rest_s}
@@ -246,7 +244,7 @@ def calibrate(
     if picture is not None:
         from gfimu.calibration.pictures import calibration_picture
 
-        calibration_picture(picture, result, others or run)
+        calibration_picture(picture, result, others or task.recording)
     return result
 
 

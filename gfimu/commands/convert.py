@@ -30,7 +30,7 @@ from gfimu.base.declared import Declared, Key, Table, figure, figures
 from gfimu.base.errors import InputError, unknown_name
 from gfimu.base.files.atomic_file import write_text
 from gfimu.commands import given
-from gfimu.commands.opened import as_array, as_runs, as_source, files_by_map, name_of
+from gfimu.commands.opened import as_array, as_calibration, as_runs, as_source, files_by_map, name_of
 from gfimu.commands.shell.completion import words
 from gfimu.commands.shell.declare import Option, command
 from gfimu.commands.shell.options import ARRAY, MAP_OF_TABLE
@@ -211,21 +211,29 @@ def convert(
     >>> import gfimu
     >>> gfimu.convert("log.csv", "run.parquet", column_map="phyphox")  # doctest: +SKIP
     """
+    from gfimu.calibration.result import Calibration
+
     sources = as_runs(source)  # type: ignore[arg-type]
     alone = sources[0] if len(sources) == 1 else None
     drawn = _array(alone, target)
     if drawn is not None:
         if (lsb_m_s2, chip, noise) != (None, None, None):
             raise InputError("--lsb-m-s2, --chip and --noise are for a calibration (.json, from gfimu calibrate)")
-        _write_array(drawn, target, to or "turntable")
+        if target is not None and Path(target).suffix != ".xml":
+            raise InputError(f"{target}: an array is written as a MuJoCo model; name it .xml")
+        from sim.rigs.mjcf_export import array_as_mjcf
+
+        text = array_as_mjcf(drawn, to or "turntable")
+        if target is not None:
+            write_text(target, text)
         return drawn
     drawing = None if array is None else as_array(array)
-    calibration = _calibration(alone)
-    if calibration is not None:
+    if isinstance(alone, Calibration) or (isinstance(alone, str | Path) and Path(alone).suffix == ".json"):
         from gfimu.calibration.exporting import TARGETS, calibrated_chips, notes_of
         from gfimu.commands.noise import noise as recorded_noise
         from gfimu.sensor_noise import RecordingNoise
 
+        calibration = as_calibration(alone)
         if to is None:
             raise InputError(f"a calibration is written for one of {', '.join(TARGETS)}; name it with --to")
         if to not in TARGETS:
@@ -301,17 +309,6 @@ def _write(recording: "Recording", target: Path) -> None:
         recording.write(target)
 
 
-def _write_array(array: "AccelerometerArray", target: "str | Path | None", rig: str) -> None:
-    """Write an array as a MuJoCo model."""
-    from sim.rigs.mjcf_export import array_as_mjcf
-
-    if target is not None and Path(target).suffix != ".xml":
-        raise InputError(f"{target}: an array is written as a MuJoCo model; name it .xml")
-    text = array_as_mjcf(array, rig)
-    if target is not None:
-        write_text(target, text)
-
-
 def _array(source: object, target: "str | Path | None") -> "AccelerometerArray | None":
     """Return the array that is to be converted: one itself, or what is named where the target is a MuJoCo model."""
     from gfimu.array.array import AccelerometerArray
@@ -323,12 +320,3 @@ def _array(source: object, target: "str | Path | None") -> "AccelerometerArray |
     if not isinstance(source, str | Path) or Path(source).suffix not in {"", ".toml", ".xml"}:
         raise InputError(f"{target}: a MuJoCo model is made of an array; give its name or .toml file")
     return as_array(source)
-
-
-def _calibration(source: object) -> "Calibration | None":
-    """Return the calibration that is to be converted; None for a recording."""
-    from gfimu.calibration.result import Calibration, load_calibration
-
-    if isinstance(source, str | Path):
-        return load_calibration(source) if Path(source).suffix == ".json" else None
-    return source if isinstance(source, Calibration) else None

@@ -173,8 +173,7 @@ def _run(values: Mapping[str, Any], as_json: bool) -> None:
     from gfimu.commands.shell.printing import print_report
 
     declared = _meant(values)
-    own = {name: values[name] for name in declared.parameters if values.get(name) is not None}
-    print_report(declared, own, as_json=as_json)
+    print_report(declared, declared.taken(values), as_json=as_json)
 
 
 def _meant(values: Mapping[str, Any]) -> Command:

@@ -13,9 +13,9 @@ gfimu estimate run.csv --array arm.toml --axis z --lever-std-m 0.003 --rotation-
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 from gfimu.base.errors import InputError, naming
 from gfimu.commands import given
@@ -54,23 +54,18 @@ _NOISE = Option(
 )
 
 
-@dataclass(frozen=True)
-class _EstimatedRun:
-    """An estimate with the recording and the array that it was made from, calibrated where that was asked for."""
-
-    estimate: "Estimate"
-    recording: "Recording"
-    array: "AccelerometerArray"
+_EstimatedRun: TypeAlias = "tuple[Estimate, Recording, AccelerometerArray]"
+"""An estimate with the recording and the array that it was made from, calibrated where that was asked for."""
 
 
-def _summary(run: _EstimatedRun, _: Mapping[str, Any]) -> "EstimateSummary":
+def _summary(estimated: _EstimatedRun, _: Mapping[str, Any]) -> "EstimateSummary":
     from gfimu.motion.estimate_summary import summarise
 
-    return summarise(run.estimate, run.recording, run.array)
+    return summarise(*estimated)
 
 
-def _estimate_of(run: _EstimatedRun) -> "Estimate":
-    return run.estimate
+def _estimate_of(estimated: _EstimatedRun) -> "Estimate":
+    return estimated[0]
 
 
 def _doing(given: Mapping[str, Any]) -> str:
@@ -199,4 +194,4 @@ def estimate(
         axis_found = result.metadata.get("turning_axis")
         turning = None if axis_found is None else TurningAxis.from_dict(axis_found, source=geometry.name)
         write_run(rrd, run, replace(geometry, turning_axis=turning or geometry.turning_axis), estimate=result)
-    return _EstimatedRun(result, run, geometry)
+    return result, run, geometry
