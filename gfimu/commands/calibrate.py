@@ -21,7 +21,7 @@ from gfimu.base.errors import InputError
 from gfimu.calibration.given import CalibrationPoses, CalibrationPrior, RateTable
 from gfimu.commands import given
 from gfimu.commands.opened import as_array, as_calibrated_run, as_calibration, as_source, name_of
-from gfimu.commands.shell import completion, options
+from gfimu.commands.shell import options
 from gfimu.commands.shell.declare import Group, Option, command
 from gfimu.commands.shell.output_files import CALIBRATION
 
@@ -52,7 +52,7 @@ _METHODS = (
 )  # fmt: skip
 """Those of `gfimu.calibration.registry`, in its order; that has the functions, and help does not wait for scipy."""
 
-_METHOD = Option(f"Method: {', '.join(_METHODS)}.", "METHOD", offers=completion.words(*_METHODS), argument=True)
+_METHOD = Option(f"Method: {', '.join(_METHODS)}.", "METHOD", offers=_METHODS, argument=True)
 _OUT = Option("Calibration to write (.json).", writes=CALIBRATION, what="calibration", needed=True)
 _PARAMETERS = Option("Per chip: 12 (full matrix) or 9 (triangular).")
 _MOTION = Option("array: recording of the motion, or of shakes (may be RUN).", kind=Path, reads=True)
@@ -74,7 +74,7 @@ _INPUT = Option(
     "Rows that the fit uses: averaged, raw or wavelet.",
     "KIND",
     name="--input",
-    offers=completion.words("averaged", "raw", "wavelet"),
+    offers=("averaged", "raw", "wavelet"),
 )
 _THRESHOLD = Option(
     "With --input wavelet: leave out all details (none, the default), or those below the universal threshold (soft or "

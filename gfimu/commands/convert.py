@@ -31,7 +31,6 @@ from gfimu.base.errors import InputError, unknown_name
 from gfimu.base.files.atomic_file import write_text
 from gfimu.commands import given
 from gfimu.commands.opened import as_array, as_calibration, as_runs, as_source, files_by_map, name_of
-from gfimu.commands.shell.completion import words
 from gfimu.commands.shell.declare import Option, command
 from gfimu.commands.shell.options import ARRAY, MAP_OF_TABLE
 from gfimu.commands.shell.output_files import EXPORT
@@ -169,7 +168,7 @@ _DROP = Option(
 _TO = Option(
     "Of a calibration, the format: kalibr or ros. Of an array: turntable, motor_turntable or free_cube.",
     "FORMAT",
-    offers=words("kalibr", "ros", "turntable", "motor_turntable", "free_cube"),
+    offers=("kalibr", "ros", "turntable", "motor_turntable", "free_cube"),
 )
 _COUNT = Option("Of a calibration for counts: m/s² per count, as the sensor's driver has it.")
 _NOISE = Option("Of a calibration: recording at rest, for noise and sample rate.", "FILE", reads=True)

@@ -23,7 +23,6 @@ from gfimu.commands.shell import options
 from gfimu.commands.shell.declare import Command, Option, command, command_of
 
 if TYPE_CHECKING:
-    from gfimu.budget.drift import ErrorSources
     from gfimu.budget.drift.equivalent import EquivalentErrors
     from gfimu.budget.drift.rest_windows import RestDrift
     from gfimu.budget.drift.result import Drift
@@ -156,16 +155,7 @@ def axis_drift(
     turning = as_known_axis(axis).of(geometry) or geometry.turning_axis
     if turning is None:
         raise InputError(f"array {geometry.name!r} has no axis of its own; give one, such as axis='z' (--axis z)")
-    return drift_about(
-        geometry,
-        turning,
-        duration,
-        bias=sources.bias,
-        noise_density=sources.noise_density,
-        bias_random_walk=sources.bias_random_walk,
-        rate_rad_s=speed_rad_s,
-        hub_density=hub_noise_m_s2_rthz,
-    )
+    return drift_about(geometry, turning, duration, rate_rad_s=speed_rad_s, hub_density=hub_noise_m_s2_rthz, **sources)
 
 
 def _run(values: Mapping[str, Any], as_json: bool) -> None:
@@ -240,13 +230,13 @@ def drift(
     """
     import numpy as np
 
-    from gfimu.budget.drift import drift_budget
+    from gfimu.budget.drift import ErrorSources, drift_budget
     from gfimu.budget.drift.monte_carlo import monte_carlo_drift
     from gfimu.budget.drift.result import Drift
 
     if monte_carlo == 1 or monte_carlo < 0:
         raise InputError(f"--monte-carlo {monte_carlo}: give 0 for none, or 2 or more runs")
-    sources = _sources(bias_mg, noise_ug, walk_ug, rate_drift_deg_h)
+    sources = ErrorSources(**_sources(bias_mg, noise_ug, walk_ug, rate_drift_deg_h))
     geometry = as_array(array or _USUAL)
     motion: dict[str, Any] = {"rate": speed_rad_s, "offset": offset, "gravity": gravity}
     budget = drift_budget(geometry, duration, sources, **motion)
@@ -257,19 +247,18 @@ def drift(
     return Drift(budget, sample, seed)
 
 
-def _sources(bias_mg: float, noise_ug: float, walk_ug: float, rate_drift_deg_h: float = 0.0) -> "ErrorSources":
-    """Return the errors in SI units; raises `InputError` if there is none."""
+def _sources(bias_mg: float, noise_ug: float, walk_ug: float, rate_drift_deg_h: float = 0.0) -> dict[str, float]:
+    """Return the errors in SI units, without those that are zero; raises `InputError` if there is none."""
     from gfimu.base.units import STANDARD_GRAVITY
-    from gfimu.budget.drift import ErrorSources
 
-    sources = ErrorSources(
-        bias=bias_mg * 1e-3 * STANDARD_GRAVITY,
-        noise_density=noise_ug * 1e-6 * STANDARD_GRAVITY,
-        bias_random_walk=walk_ug * 1e-6 * STANDARD_GRAVITY,
-        rate_drift=math.radians(rate_drift_deg_h / 3600.0),
-    )
-    if not any(vars(sources).values()):
+    sources = {
+        "bias": bias_mg * 1e-3 * STANDARD_GRAVITY,
+        "noise_density": noise_ug * 1e-6 * STANDARD_GRAVITY,
+        "bias_random_walk": walk_ug * 1e-6 * STANDARD_GRAVITY,
+        "rate_drift": math.radians(rate_drift_deg_h / 3600.0),
+    }
+    if not any(sources.values()):
         raise InputError(
             "no error to budget: give at least one of --bias-mg, --noise-ug, --walk-ug, --rate-drift-deg-h"
         )
-    return sources
+    return {name: size for name, size in sources.items() if size}

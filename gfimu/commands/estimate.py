@@ -22,7 +22,6 @@ from gfimu.commands import given
 from gfimu.commands.known_axis import AXIS, AxisLike, as_known_axis
 from gfimu.commands.place import PLACE, Place
 from gfimu.commands.shell import options
-from gfimu.commands.shell.completion import words
 from gfimu.commands.shell.declare import Option, command
 from gfimu.commands.shell.output_files import ESTIMATE
 from gfimu.rate.registry import RATE_METHODS, rate_method
@@ -39,8 +38,8 @@ __all__ = ["estimate"]
 
 _FILTERED = " (filter, smoother)"
 _OUT = Option("Estimate to write (.csv, .parquet)", writes=ESTIMATE, what="estimate", needed=True)
-_METHOD = Option(f"Angular rate by: {', '.join(RATE_METHODS)}.", "METHOD", offers=words(*RATE_METHODS))
-_FORMS = words("auto", "linear", "joint", "recursive")
+_METHOD = Option(f"Angular rate by: {', '.join(RATE_METHODS)}.", "METHOD", offers=tuple(RATE_METHODS))
+_FORMS = ("auto", "linear", "joint", "recursive")
 _FORM = Option("How readings turn into p and α: auto, linear, joint or recursive.", "FORM", offers=_FORMS)
 _OMEGA = Option("Angular rate at the first sample (3,), body axes, rad/s; at rest by default.", shell=False)
 _QUATERNION = Option(

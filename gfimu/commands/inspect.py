@@ -25,12 +25,8 @@ if TYPE_CHECKING:
 
 __all__ = ["inspect"]
 
-_FILE = Option(
-    "Text, gzipped or zipped, JSON, Parquet, Excel, MATLAB, HDF5, ULog, MCAP, ROS bag.",
-    "FILE",
-    kind=Path,
-    argument=True,
-    reads=True,
+_FILE = replace(
+    given.RUN, text="Text, gzipped or zipped, JSON, Parquet, Excel, MATLAB, HDF5, ULog, MCAP, ROS bag.", metavar="FILE"
 )
 
 

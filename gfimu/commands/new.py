@@ -20,7 +20,6 @@ from gfimu.base.declared import Declared, FileText, figure
 from gfimu.base.errors import InputError, unknown_name
 from gfimu.base.files.outputs import OutputFolder
 from gfimu.commands.file_kinds import FILE_KINDS, file_schema
-from gfimu.commands.shell.completion import words
 from gfimu.commands.shell.declare import Option, command
 from gfimu.commands.shell.output_files import JSON_SCHEMA, TOML_FILE
 
@@ -33,7 +32,7 @@ SENDER = "sender"
 """The folder that can be begun: C files with which a board of one's own sends frames."""
 
 _BEGUN = (*TEMPLATES, SENDER)
-_KIND = Option(f"What to begin: {', '.join(_BEGUN)}.", "KIND", argument=True, offers=words(*_BEGUN))
+_KIND = Option(f"What to begin: {', '.join(_BEGUN)}.", "KIND", argument=True, offers=_BEGUN)
 _FOLDER = Option(
     "Of a sender: folder to write; without it, what to do with it is printed.", "[FOLDER]", argument=True,
     writes=OutputFolder(()), what=SENDER,

@@ -80,7 +80,8 @@ def as_source(
     from gfimu.base.files.memory import with_memory
     from gfimu.recording import Recording
     from gfimu.recording.importing import load_map
-    from gfimu.recording.mapped import MappedFile
+    from gfimu.recording.mapped import MappedFile, mapped_recording
+    from gfimu.recording.tables.table_columns import TableColumns
 
     if is_arrays(recording):
         if column_map is not None:
@@ -89,7 +90,11 @@ def as_source(
             raise InputError("NumPy arrays: times and readings do not name their array; give it as array=")
         return Recording.from_arrays(*recording, as_array(array))
     if not isinstance(recording, Recording | str | Path | MappedFile):
-        return _of_table(recording, array, column_map)
+        if column_map is None:
+            table = recording if isinstance(recording, TableColumns) else TableColumns(recording)
+            return cast("RecordingSource", table)
+        geometry = None if array is None else as_array(array)
+        return mapped_recording(cast("ArrowStream", recording), column_map, array=geometry)
     if isinstance(recording, str | Path):
         recording = with_memory(recording, max_memory)
         return recording if column_map is None else files_by_map([recording], column_map)
@@ -108,21 +113,6 @@ def is_arrays(recording: object) -> TypeGuard[tuple[ArrayLike, ArrayLike]]:
 
     kinds = (np.ndarray, list)
     return isinstance(recording, tuple) and len(recording) == 2 and all(isinstance(one, kinds) for one in recording)
-
-
-def _of_table(
-    table: object,
-    array: AccelerometerArray | str | Path | None,
-    column_map: ColumnMap | str | Path | None,
-) -> RecordingSource:
-    from gfimu.recording.importing import load_map
-    from gfimu.recording.mapped import mapped_recording
-    from gfimu.recording.tables.table_columns import TableColumns
-
-    if column_map is None:
-        return cast("RecordingSource", table if isinstance(table, TableColumns) else TableColumns(table))
-    chosen = load_map(column_map)
-    return mapped_recording(cast("ArrowStream", table), chosen, array=None if array is None else as_array(array))
 
 
 def files_by_map(files: Sequence[str | Path], column_map: ColumnMap | str | Path) -> MappedFile:

@@ -36,7 +36,7 @@ _CALIBRATED = Option(
     "none, rest, poses or poses+rest; may be repeated; all that are possible by default.",
     "NAME",
     kind=list[str],
-    offers=completion.words("none", "rest", "poses", "poses+rest"),
+    offers=("none", "rest", "poses", "poses+rest"),
 )
 _PICK_UP = Option(f"Pick-up of each other axis of the chip, 1 σ, %{_SHEET}.")
 

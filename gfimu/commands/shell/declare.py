@@ -11,7 +11,7 @@ import functools
 import inspect
 import re
 import textwrap
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, is_dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, ParamSpec, TypeVar, get_args, get_origin, overload
@@ -20,7 +20,7 @@ from gfimu.base.declared import Declared
 from gfimu.base.errors import InputError, did_you_mean, unknown_name
 from gfimu.base.files.outputs import Output, OutputFolder, check_outputs
 from gfimu.base.lazy_names import declared_names
-from gfimu.commands.shell.completion import words
+from gfimu.commands.shell.completion import beginning
 from gfimu.commands.shell.named_files import files_named
 
 __all__ = ["Command", "Group", "Option", "choices_of", "command", "command_of", "marked", "module_help"]
@@ -47,8 +47,8 @@ class Option:
         Type of the value on the shell, where the Python parameter takes objects too; where it takes a path, a path.
     panel : str
         Heading under which help lists the option; empty for the first list.
-    offers : callable, optional
-        Returns the values that shell completion offers; a ``Literal`` offers its own values.
+    offers : callable or sequence of str, optional
+        The words that shell completion offers, or what returns them with descriptions; a ``Literal`` offers its own.
     reads : bool
         Whether the value names files that the command reads, so that no output may replace them.
     writes : OutputFile or OutputFolder, optional
@@ -71,7 +71,7 @@ class Option:
     name: str = ""
     kind: Any = None
     panel: str = ""
-    offers: Callable[[str], list[tuple[str, str]]] | None = None
+    offers: Callable[[str], list[tuple[str, str]]] | Sequence[str] = ()
     reads: bool = False
     writes: Output | None = None
     what: str | Callable[[Path], str] = ""
@@ -89,9 +89,9 @@ class Option:
         import typer  # not for those who call the function
 
         text = self.text if self.text.endswith((".", "?")) else f"{self.text}."
-        choices = get_args(kind) if get_origin(kind) is Literal else ()
-        offers = words(*choices) if choices and self.offers is None else self.offers
-        settings: dict[str, Any] = {"help": text, "metavar": self.metavar or None, "autocompletion": offers}
+        words = self.offers or (get_args(kind) if get_origin(kind) is Literal else ())
+        offers = words if callable(words) or not words else lambda incomplete: beginning(incomplete, words)
+        settings: dict[str, Any] = {"help": text, "metavar": self.metavar or None, "autocompletion": offers or None}
         if self.argument:
             return typer.Argument(**settings)
         return typer.Option(self.flag(name), rich_help_panel=self.panel or None, min=self.least, **settings)

@@ -5,7 +5,7 @@ What is special to a command goes behind the common description or before it (`O
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from gfimu.base.files.outputs import RECORDING, RERUN
 from gfimu.commands.shell import completion
@@ -17,14 +17,14 @@ if TYPE_CHECKING:
 
 FOREIGN = "A file of another layout"
 
+
+def _named(text: str, metavar: str, offers: Any, *, kind: Any = str, **settings: Any) -> Option:
+    """Return the option for a file that may be given by the name of one that comes with gfimu."""
+    return Option(text, metavar, offers=offers, kind=kind, reads=True, **settings)
+
+
 ALLOW_CODE = Option("Let a file run the Python code that it names: only a file that you trust.")
-ARRAY = Option(
-    "Array: a name, an array file (.toml) or an MJCF file with sites (.xml)",
-    "ARRAY",
-    offers=completion.arrays,
-    kind=str,
-    reads=True,
-)
+ARRAY = _named("Array: a name, an array file (.toml) or an MJCF file with sites (.xml)", "ARRAY", completion.arrays)
 BAUD = Option("Speed of the line, bits per second", "BAUD")
 BIAS_MG = Option("Bias of each channel, 1 σ, mg", "MG")
 BIAS_STD_M_S2 = Option("Standard deviation of each channel's bias, m/s²", "M/S²")
@@ -36,13 +36,7 @@ DURATION = Option("Length of the run, s", "S")
 FORCE = Option("Go on where the checks of units, time, array and channels refuse the file")
 GRAVITY = Option("Local gravity, m/s²", "M/S²")
 GYRO = Option("Fuse the gyro columns as well")
-IMAGE = Option(
-    "Image: gfimu, selfcheck, or an ELF or .bin file.",
-    "IMAGE",
-    kind=str,
-    offers=completion.words("gfimu", "selfcheck"),
-    reads=True,
-)
+IMAGE = _named("Image: gfimu, selfcheck, or an ELF or .bin file.", "IMAGE", ("gfimu", "selfcheck"))
 KEEP_FAULTY = Option("Use channels that contradict the others, too")
 LATITUDE = Option("Latitude, degrees", "DEG")
 LIMIT = Option("Only so many worlds of each set, which stand in random order.", "N", least=1)
@@ -59,52 +53,34 @@ RECORDINGS = Option("Recordings of one rig: .csv, .parquet, .bin", "RUN...", kin
 RECORDING_OUT = Option("Recording to write (.csv, .parquet).", "FILE", writes=RECORDING, what="recording")
 REST_THRESHOLD = Option("Threshold of rest, reading unit squared; else from the data.", "UNIT²")
 RRD = Option("Rerun recording to write (.rrd)", "FILE", writes=RERUN)
-SCENARIO = Option(
-    "Scenario: a name, or a scenario file (.toml)", "SCENARIO", offers=completion.scenarios, kind=str, reads=True
-)
+SCENARIO = _named("Scenario: a name, or a scenario file (.toml)", "SCENARIO", completion.scenarios)
 SEED = Option("Seed of everything left to chance", "N", least=0)
 SETS = Option(
     "Set of worlds; may be repeated. All that are drawn by default.",
     "SET",
     kind=list[str],
-    offers=completion.words("own", "independent", "unlisted", "dcmotor", "real"),
+    offers=("own", "independent", "unlisted", "dcmotor", "real"),
 )
 SHARE = Option("Called with the share done, 0 to 1.", shell=False)
 SPEED_RAD_S = Option("Angular rate, rad/s", "RAD/S")
-SPLIT = Option(
-    "Worlds to develop on (dev), or those of the published table (test).",
-    "SPLIT",
-    offers=completion.words("dev", "test"),
-)
+SPLIT = Option("Worlds to develop on (dev), or those of the published table (test).", "SPLIT")
 TABLE = Option("Table, topic or member of a file that holds several.", "NAME", panel=FOREIGN)
 TIME_LIMIT = Option("Real time to spend at most, s", "S")
-TWIN = Option(
-    "Twin, what the simulation assumes: a name, or a twin file (.toml).",
-    "TWIN",
-    offers=completion.twins,
-    kind=str,
-    reads=True,
-)
+TWIN = _named("Twin, what the simulation assumes: a name, or a twin file (.toml).", "TWIN", completion.twins)
 UNKNOWN_START = Option("The body may turn already when the run begins")
 WORKERS = Option("Processes to work in; by default one per processor", "N")
 
 
-ARRAYS = Option(
-    "Names, array files (.toml) or MJCF files (.xml); all shipped ones.",
-    "[ARRAY]...", kind=list[str], argument=True, offers=completion.arrays, reads=True,
+ARRAYS = _named(
+    "Names, array files (.toml) or MJCF files (.xml); all shipped ones.", "[ARRAY]...", completion.arrays,
+    kind=list[str], argument=True,
 )  # fmt: skip
 
 
 def _map_from_options(
     column_map: Annotated[
         str | None,
-        Option(
-            "Column map: a name, or a TOML file (gfimu inspect writes one).",
-            "MAP",
-            name="--map",
-            offers=completion.maps,
-            reads=True,
-        ),
+        _named("Column map: a name, or a TOML file (gfimu inspect writes one).", "MAP", completion.maps, name="--map"),
     ] = None,
     map_set: Annotated[
         list[str],
@@ -141,7 +117,7 @@ MAP = replace(MAP_OF_TABLE, without=("table",))
 
 def _reference_map_from_options(
     reference_map: Annotated[
-        str | None, Option("Column map of the file of references.", "MAP", offers=completion.maps, reads=True)
+        str | None, _named("Column map of the file of references.", "MAP", completion.maps)
     ] = None,
     reference_map_set: Annotated[
         list[str], Option("Set a key of the reference's column map; may be repeated.", "KEY=VALUE")
