@@ -52,9 +52,7 @@ _METHODS = (
 )  # fmt: skip
 """Those of `gfimu.calibration.registry`, in its order; that has the functions, and help does not wait for scipy."""
 
-_METHOD = Option(f"Method: {', '.join(_METHODS)}.", "METHOD", offers=_METHODS, argument=True)
 _OUT = Option("Calibration to write (.json).", writes=CALIBRATION, what="calibration", needed=True)
-_PARAMETERS = Option("Per chip: 12 (full matrix) or 9 (triangular).")
 _MOTION = Option("array: recording of the motion, or of shakes (may be RUN).", kind=Path, reads=True)
 _CHECK = Option("Other poses at rest, which the fit does not see: norm of a minus g on them.", kind=Path, reads=True)
 _PROGRESS = Option("Called with the share done of a fit to shakes, 0 to 1.", shell=False)
@@ -146,7 +144,7 @@ _RATE_TABLE = Group(
 
 @command(doing="calibrating")
 def calibrate(
-    method: Annotated[str, _METHOD],
+    method: Annotated[str, Option(f"Method: {', '.join(_METHODS)}.", "METHOD", offers=_METHODS, argument=True)],
     recording: Annotated[
         given.Run, given.RUN.also(" of static poses: .csv, .parquet, a MIMU4444 stream, or text rows time x y z.")
     ],
@@ -154,7 +152,7 @@ def calibrate(
     out: Annotated["str | Path | None", _OUT] = None,
     array: given.Array = None,
     gravity: Annotated["Latitude | float | None", _GRAVITY] = None,
-    parameters: Annotated[int | None, _PARAMETERS] = None,
+    parameters: Annotated[int | None, Option("Per chip: 12 (full matrix) or 9 (triangular).")] = None,
     poses: Annotated["CalibrationPoses | None", _POSES] = None,
     motion: Annotated["RecordingLike | None", _MOTION] = None,
     prior: Annotated["CalibrationPrior | None", _PRIOR] = None,

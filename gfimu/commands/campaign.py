@@ -29,13 +29,10 @@ _PICTURE = OutputFile(
 )
 _PLAN = Option("Plan (.toml), or the folder of a campaign, of which nothing is run.", "PLAN", argument=True, reads=True)
 _OUT = Option("Folder to write; one that was begun is continued.", writes=OutputFolder(("plan.toml",)), what="campaign")
-_WORKERS = WORKERS.also("; with --cluster slurm, jobs", least=1)
-_CLUSTER = Option("Dask scheduler instead, such as tcp://host:8786, or slurm.")
 _PROGRESS = Option("Called with the number of cases that are done and of all.", shell=False)
 _FOLDER = Option("Folder of the campaign.", "DIR", argument=True, reads=True)
 _TABLE = OutputFile("a table", (".csv",))
 _CSV = Option("File to write: the quantiles, one row per group.", "FILE", writes=_TABLE, what="quantiles")
-_DRAWING = Option("Picture to write (.png, .svg, .html).", writes=_PICTURE, what="picture")
 _RESULT = Option("Result to draw; may be repeated. The first four by default.", "NAME", kind=list[str])
 
 
@@ -54,8 +51,8 @@ def campaign(
     *,
     out: Annotated[str | Path | None, _OUT] = None,
     by: Annotated[Sequence[str], BY] = (),
-    workers: Annotated[int | None, _WORKERS] = None,
-    cluster: Annotated[str, _CLUSTER] = "",
+    workers: Annotated[int | None, WORKERS.also("; with --cluster slurm, jobs", least=1)] = None,
+    cluster: Annotated[str, Option("Dask scheduler instead, such as tcp://host:8786, or slurm.")] = "",
     progress: Annotated[Callable[[int, int], None] | None, _PROGRESS] = None,
 ) -> "CampaignResult":
     """Run the cases of a plan that its folder lacks, and summarise them; or summarise a folder.
@@ -177,7 +174,7 @@ def _plot(drawn: list[str], _: Mapping[str, Any]) -> "CampaignPlot":
 def campaign_plot(
     folder: Annotated[str | Path, _FOLDER],
     *,
-    out: Annotated[str | Path, _DRAWING],
+    out: Annotated[str | Path, Option("Picture to write (.png, .svg, .html).", writes=_PICTURE, what="picture")],
     result: Annotated[Sequence[str], _RESULT] = (),
 ) -> list[str]:
     """Draw results against each factor, and which factors cause their variance; return the names of what is drawn.

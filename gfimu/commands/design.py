@@ -30,7 +30,6 @@ _EFFECTS = Option(
 )
 _VERDICT = Option("Take the effects of an ambiguous verdict (verdict.json).", "FILE", reads=True)
 _RUN = "Recording at hand, to be diagnosed together with the new one; may be repeated."
-_ACCELERATION = Option("Largest angular acceleration of the table, rad/s².", "RAD/S²")
 
 
 @command(doing="designing")
@@ -44,7 +43,7 @@ def design(
     column_map: given.Map = None,
     max_memory: given.Memory = None,
     max_rate: Annotated[float, Option("Largest rate of the table, rad/s.", "RAD/S")] = 15.0,
-    max_acceleration: Annotated[float, _ACCELERATION] = 20.0,
+    max_acceleration: Annotated[float, Option("Largest angular acceleration of the table, rad/s².", "RAD/S²")] = 20.0,
     duration: Annotated[float, options.DURATION] = 60.0,
     upright: Annotated[bool, Option("Never propose to mount the array differently.")] = False,
     evaluations: Annotated[int, Option("How many profiles to try.", "N", least=1)] = 150,

@@ -39,9 +39,6 @@ _LEAD = Option("With RUN: rest before each window, from which tilt and biases ar
 _POSITION = Option("Measured position error x y z after --duration, m, z up: which bias or drift would explain it?")
 _KNOWN_BIAS = Option("With --from-position: known bias of p, x y z, mg; its share is taken off first.")
 _LATITUDE = options.LATITUDE.also(", for the Earth's share", when="With --from-position: ")
-_HUB_NOISE = Option("Of a free hub: density of its own force, m/s²/√Hz.")
-_RATE_DRIFT = Option("Constant error of the angular rate per axis, °/h.")
-_OFFSET = Option("Horizontal place of the unit off the axis, x y, m.")
 _OF_RECORDINGS = {"lead", "calibration", "picture", "column_map", "force"}
 _OF_POSITIONS = {"known_bias_mg", "latitude"}
 _OF_FREE_BODIES = {"rate_drift_deg_h", "offset", "monte_carlo"}
@@ -132,7 +129,7 @@ def axis_drift(
     noise_ug: Annotated[float, options.NOISE_UG] = 0.0,
     walk_ug: Annotated[float, _WALK] = 0.0,
     speed_rad_s: Annotated[float, _SPEED] = 0.0,
-    hub_noise_m_s2_rthz: Annotated[float, _HUB_NOISE] = 0.1,
+    hub_noise_m_s2_rthz: Annotated[float, Option("Of a free hub: density of its own force, m/s²/√Hz.")] = 0.1,
 ) -> "AxisDrift":
     """Budget the drift of rate and angle about a known axis, for as few as one chip.
 
@@ -204,9 +201,9 @@ def drift(
     bias_mg: Annotated[float, options.BIAS_MG] = 0.0,
     noise_ug: Annotated[float, options.NOISE_UG] = 0.0,
     walk_ug: Annotated[float, _WALK] = 0.0,
-    rate_drift_deg_h: Annotated[float, _RATE_DRIFT] = 0.0,
+    rate_drift_deg_h: Annotated[float, Option("Constant error of the angular rate per axis, °/h.")] = 0.0,
     speed_rad_s: Annotated[float, _SPEED] = 0.0,
-    offset: Annotated[tuple[float, float], _OFFSET] = (0.0, 0.0),
+    offset: Annotated[tuple[float, float], Option("Horizontal place of the unit off the axis, x y, m.")] = (0.0, 0.0),
     gravity: Annotated[float, options.GRAVITY] = 9.80665,
     monte_carlo: Annotated[int, Option("Number of nonlinear Monte Carlo runs; 0 for none.")] = 0,
     seed: Annotated[int, options.SEED] = 0,

@@ -23,9 +23,8 @@ __all__ = ["Array", "CalibrationToApply", "Map", "Memory", "Picture", "Progress"
 RUN = Option("Recording", "RUN", kind=Path, argument=True, reads=True)
 """A recording that a command reads; what it has to hold is said by `Option.also`."""
 
-_OWN_ARRAY = options.ARRAY.also("; else the recording's own")
 
-Array: TypeAlias = Annotated["AccelerometerArray | str | Path | None", _OWN_ARRAY]
+Array: TypeAlias = Annotated["AccelerometerArray | str | Path | None", options.ARRAY.also("; else the recording's own")]
 CalibrationToApply: TypeAlias = Annotated["Calibration | str | Path | None", options.CALIBRATION]
 Map: TypeAlias = Annotated["ColumnMap | str | Path | None", options.MAP]
 Memory: TypeAlias = Annotated["MemorySize | None", options.MAX_MEMORY]

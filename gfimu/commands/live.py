@@ -30,8 +30,6 @@ _FROM = Option(
     "Where samples come from: - (standard input), a recording, or host:port of a TCP server.", name="--from", kind=str,
     reads=True,
 )  # fmt: skip
-_FOLLOW = Option("With a recording: go on reading while gfimu record writes it.")
-_SCALE_STD = Option("Uncertainty of the scale factors, a ratio (0.01 is 1 %).")
 
 
 def _results() -> tuple[type, ...]:
@@ -56,8 +54,8 @@ def live(
     rate: Annotated[float | None, RATE.also(", nominal; else the stream's own")] = None,
     *,
     source: Annotated["str | Path | Iterable[str]", _FROM] = "-",
-    follow: Annotated[bool, _FOLLOW] = False,
-    scale_std: Annotated[float, _SCALE_STD] = 0.0,
+    follow: Annotated[bool, Option("With a recording: go on reading while gfimu record writes it.")] = False,
+    scale_std: Annotated[float, Option("Uncertainty of the scale factors, a ratio (0.01 is 1 %).")] = 0.0,
     bias_std_m_s2: Annotated[float | None, BIAS_STD_M_S2.also("; else the data sheets'")] = None,
     unknown_start: Annotated[bool, UNKNOWN_START] = False,
     gyro: Annotated[bool, GYRO] = False,

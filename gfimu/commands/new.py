@@ -32,7 +32,6 @@ SENDER = "sender"
 """The folder that can be begun: C files with which a board of one's own sends frames."""
 
 _BEGUN = (*TEMPLATES, SENDER)
-_KIND = Option(f"What to begin: {', '.join(_BEGUN)}.", "KIND", argument=True, offers=_BEGUN)
 _FOLDER = Option(
     "Of a sender: folder to write; without it, what to do with it is printed.", "[FOLDER]", argument=True,
     writes=OutputFolder(()), what=SENDER,
@@ -66,7 +65,7 @@ def _report(text: str, given: Any) -> Begun:
 
 @command(report=_report, files=_files, results=lambda: (Begun,))
 def new(
-    kind: Annotated[str, _KIND],
+    kind: Annotated[str, Option(f"What to begin: {', '.join(_BEGUN)}.", "KIND", argument=True, offers=_BEGUN)],
     folder: Annotated[str | Path | None, _FOLDER] = None,
     *,
     out: Annotated[str | Path | None, _OUT] = None,

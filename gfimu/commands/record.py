@@ -50,9 +50,6 @@ _PORT = PORT.also(
     "or phyphox://address:port",
     reads=True,
 )
-_FIND = Option("Look for the board: every port or --port, every speed and format.")
-_SELF_TEST = Option("Test the chips first, at rest, against the data sheet's limits.")
-_LIVE = Option("Show rate, health and scene in the rerun viewer meanwhile.")
 _BOARD = Group(
     BoardSettings, "The board: ``gfimu.BoardSettings(rate=800, array='cube12')``; by default as it is, or says."
 )
@@ -64,12 +61,12 @@ def record(
     port: Annotated[str, _PORT] = "",
     out: Annotated["str | Path | None", RECORDING_OUT] = None,
     *,
-    find: Annotated[bool, _FIND] = False,
-    self_test: Annotated[bool, _SELF_TEST] = False,
+    find: Annotated[bool, Option("Look for the board: every port or --port, every speed and format.")] = False,
+    self_test: Annotated[bool, Option("Test the chips first, at rest, against the data sheet's limits.")] = False,
     duration: Annotated[float | None, DURATION.also("; else until Ctrl-C", least=0.0)] = None,
     board: Annotated["BoardSettings | None", _BOARD] = None,
     rrd: Annotated["str | Path | None", RRD.also(" while recording")] = None,
-    live: Annotated[bool, _LIVE] = False,
+    live: Annotated[bool, Option("Show rate, health and scene in the rerun viewer meanwhile.")] = False,
     callbacks: Annotated["RecordCallbacks | None", _CALLBACKS] = None,
 ) -> "RecordReport | None":
     """Record from a board, real or virtual, until the duration ends, a callback says so, or Ctrl-C.

@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 __all__ = ["simulate"]
 
 _CHANGES = Option("Change a key of the scenario file; may be repeated.", "KEY=VALUE", name="--set", kind=list[str])
-_RAW = Option("Keep the readings as counts of the converter.")
 
 
 def _recording(simulated: "Simulated") -> "Recording":
@@ -41,7 +40,7 @@ def simulate(
     out: Annotated["str | Path | None", RECORDING_OUT.also(needed=True)] = None,
     seed: Annotated[int, SEED] = 0,
     changes: Annotated["Sequence[str]", _CHANGES] = (),
-    raw: Annotated[bool, _RAW] = False,
+    raw: Annotated[bool, Option("Keep the readings as counts of the converter.")] = False,
     max_memory: Annotated[given.Memory, MAX_MEMORY.also("; of the run, half of the machine's")] = None,
     rrd: Annotated["str | Path | None", RRD] = None,
     progress: Annotated["Callable[[float], None] | None", SHARE] = None,
