@@ -18,12 +18,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from gfimu.array.gravity import Latitude
 from gfimu.base.errors import InputError
+from gfimu.base.files.outputs import OutputFile
 from gfimu.calibration.given import CalibrationPoses, CalibrationPrior, RateTable
 from gfimu.commands import given
 from gfimu.commands.opened import as_array, as_calibrated_run, as_calibration, as_source, name_of
 from gfimu.commands.shell import options
 from gfimu.commands.shell.declare import Group, Option, command
-from gfimu.commands.shell.output_files import CALIBRATION
 
 if TYPE_CHECKING:
     from gfimu.calibration.method import CalibrationMethod
@@ -52,7 +52,9 @@ _METHODS = (
 )  # fmt: skip
 """Those of `gfimu.calibration.registry`, in its order; that has the functions, and help does not wait for scipy."""
 
-_OUT = Option("Calibration to write (.json).", writes=CALIBRATION, what="calibration", needed=True)
+_CALIBRATION_FILE = OutputFile("a calibration", (".json",))
+_OUT = Option("Calibration to write (.json).", writes=_CALIBRATION_FILE, what="calibration", needed=True)
+_RECORDING = given.RUN.also(" of static poses: .csv, .parquet, a MIMU4444 stream, or text rows time x y z.")
 _MOTION = Option("array: recording of the motion, or of shakes (may be RUN).", kind=Path, reads=True)
 _CHECK = Option("Other poses at rest, which the fit does not see: norm of a minus g on them.", kind=Path, reads=True)
 _PROGRESS = Option("Called with the share done of a fit to shakes, 0 to 1.", shell=False)
@@ -145,9 +147,7 @@ _RATE_TABLE = Group(
 @command(doing="calibrating")
 def calibrate(
     method: Annotated[str, Option(f"Method: {', '.join(_METHODS)}.", "METHOD", offers=_METHODS, argument=True)],
-    recording: Annotated[
-        given.Run, given.RUN.also(" of static poses: .csv, .parquet, a MIMU4444 stream, or text rows time x y z.")
-    ],
+    recording: Annotated[given.Run, _RECORDING],
     *,
     out: Annotated["str | Path | None", _OUT] = None,
     array: given.Array = None,

@@ -17,22 +17,20 @@ from typing import TYPE_CHECKING, Annotated, Any
 from gfimu.base.errors import InputError
 from gfimu.base.files.outputs import OutputFile, OutputFolder
 from gfimu.commands.shell.declare import Option, command
-from gfimu.commands.shell.options import BY, WORKERS
+from gfimu.commands.shell.options import BY, WORKERS, picture_file
 
 if TYPE_CHECKING:
     from sim.trials.sweep.results import CampaignPlot, CampaignResult, CampaignStatus, CampaignTable
 
 __all__ = ["campaign", "campaign_plot", "campaign_status", "campaign_table"]
 
-_PICTURE = OutputFile(
-    "a picture", (".png", ".svg", ".html"), dict.fromkeys((".png", ".svg", ".html"), ("matplotlib",)), any_case=True
-)
 _PLAN = Option("Plan (.toml), or the folder of a campaign, of which nothing is run.", "PLAN", argument=True, reads=True)
 _OUT = Option("Folder to write; one that was begun is continued.", writes=OutputFolder(("plan.toml",)), what="campaign")
 _PROGRESS = Option("Called with the number of cases that are done and of all.", shell=False)
 _FOLDER = Option("Folder of the campaign.", "DIR", argument=True, reads=True)
 _TABLE = OutputFile("a table", (".csv",))
 _CSV = Option("File to write: the quantiles, one row per group.", "FILE", writes=_TABLE, what="quantiles")
+_DRAWING = Option("Picture to write (.png, .svg, .html).", writes=picture_file(".png", ".svg", ".html"), what="picture")
 _RESULT = Option("Result to draw; may be repeated. The first four by default.", "NAME", kind=list[str])
 
 
@@ -174,7 +172,7 @@ def _plot(drawn: list[str], _: Mapping[str, Any]) -> "CampaignPlot":
 def campaign_plot(
     folder: Annotated[str | Path, _FOLDER],
     *,
-    out: Annotated[str | Path, Option("Picture to write (.png, .svg, .html).", writes=_PICTURE, what="picture")],
+    out: Annotated[str | Path, _DRAWING],
     result: Annotated[Sequence[str], _RESULT] = (),
 ) -> list[str]:
     """Draw results against each factor, and which factors cause their variance; return the names of what is drawn.

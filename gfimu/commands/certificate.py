@@ -36,6 +36,7 @@ FOLDER = OutputFolder(("certificate.json", "certificate.html"), meanings=("certi
 """What a certificate writes."""
 
 _CALIBRATION = Option("Calibration file, from `gfimu calibrate`.", "CAL", argument=True, reads=True)
+_OUT = Option("Folder to write: certificate.json, certificate.html.", writes=FOLDER)
 _COMPARE = Option("Another calibration or certificate of the same chips: E_n of each quantity.", reads=True)
 _STAGE = Option("Errors of stage and gravity, for the budget (.toml); gfimu new stage writes one to edit.", reads=True)
 _REST = Option(
@@ -49,9 +50,7 @@ _SENSOR = Option("The array as an angular sensor, in place of ``array`` and ``re
 def certificate(
     calibration: Annotated["Calibration | str | Path", _CALIBRATION],
     *,
-    out: Annotated[
-        "str | Path | None", Option("Folder to write: certificate.json, certificate.html.", writes=FOLDER)
-    ] = None,
+    out: Annotated["str | Path | None", _OUT] = None,
     compare: Annotated["Calibration | Certificate | str | Path | None", _COMPARE] = None,
     stage: Annotated["Stage | str | Path | None", _STAGE] = None,
     array: Annotated[given.Array, ARRAY.also(". Adds its sheet as an angular sensor (IEEE 671)")] = None,

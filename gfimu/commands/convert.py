@@ -29,11 +29,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 from gfimu.base.declared import Declared, Key, Table, figure, figures
 from gfimu.base.errors import InputError, unknown_name
 from gfimu.base.files.atomic_file import write_text
+from gfimu.base.files.outputs import OutputFile
 from gfimu.commands import given
 from gfimu.commands.opened import as_array, as_calibration, as_runs, as_source, files_by_map, name_of
 from gfimu.commands.shell.declare import Option, command
 from gfimu.commands.shell.options import ARRAY, MAP_OF_TABLE
-from gfimu.commands.shell.output_files import EXPORT
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -153,13 +153,18 @@ _SOURCE = Option(
     argument=True,
     reads=True,
 )
+_EXPORT = OutputFile(
+    "what is converted",
+    (".csv", ".parquet", ".mcap", ".euroc", ".yaml", ".yml", ".xml"),
+    {".mcap": ("mcap", "rosbags"), ".xml": ("mujoco",)},
+)
 _TARGET = Option(
     "File to write: .csv, .parquet, .mcap (ROS 2), .euroc (a folder); .yaml of a calibration; .xml of an array, for "
     "MuJoCo.",
     "TARGET",
     argument=True,
     needed=True,
-    writes=EXPORT,
+    writes=_EXPORT,
     what=_kind_of,
 )
 _DROP = Option(

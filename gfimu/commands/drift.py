@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 __all__ = ["axis_drift", "drift", "drift_from_position", "drift_of_rest"]
 
+_RECORDING = given.RUN.also(" with long rests: the drift that it has, beside what its noise predicts.", metavar="[RUN]")
 _USUAL = "cube12"
 _ARRAY = options.ARRAY.also(f"; else the recording's own, or {_USUAL} without a recording")
 _TIME = options.DURATION.also(", from the start of navigation")
@@ -46,10 +47,7 @@ _OF_FREE_BODIES = {"rate_drift_deg_h", "offset", "monte_carlo"}
 
 @command(doing="navigating through the rests")
 def drift_of_rest(
-    recording: Annotated[
-        given.Run,
-        given.RUN.also(" with long rests: the drift that it has, beside what its noise predicts.", metavar="[RUN]"),
-    ],
+    recording: Annotated[given.Run, _RECORDING],
     array: Annotated[given.Array, _ARRAY] = None,
     *,
     duration: Annotated[float, _TIME] = 30.0,

@@ -23,7 +23,6 @@ from gfimu.commands.known_axis import AXIS, AxisLike, as_known_axis
 from gfimu.commands.place import PLACE, Place
 from gfimu.commands.shell import options
 from gfimu.commands.shell.declare import Option, command
-from gfimu.commands.shell.output_files import ESTIMATE
 from gfimu.rate.registry import RATE_METHODS, rate_method
 
 if TYPE_CHECKING:
@@ -37,7 +36,6 @@ if TYPE_CHECKING:
 __all__ = ["estimate"]
 
 _FILTERED = " (filter, smoother)"
-_OUT = Option("Estimate to write (.csv, .parquet)", writes=ESTIMATE, what="estimate", needed=True)
 _METHOD = Option(f"Angular rate by: {', '.join(RATE_METHODS)}.", "METHOD", offers=tuple(RATE_METHODS))
 _FORMS = ("auto", "linear", "joint", "recursive")
 _FORM = Option("How readings turn into p and α: auto, linear, joint or recursive.", "FORM", offers=_FORMS)
@@ -86,7 +84,7 @@ def estimate(
     recording: Annotated[given.Run, given.RUN.also(": .csv, .parquet, or a MIMU4444 stream (.bin, .bin.gz).")],
     array: given.Array = None,
     *,
-    out: Annotated["str | Path | None", _OUT] = None,
+    out: Annotated["str | Path | None", options.ESTIMATE_OUT.also(what="estimate", needed=True)] = None,
     method: Annotated[str, _METHOD] = "integrate",
     form: Annotated[str, _FORM] = "auto",
     rest_bias: Annotated[bool, Option("Read the biases off the first rest (table level) and take them off.")] = False,

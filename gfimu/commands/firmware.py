@@ -13,11 +13,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypedDict, Unpack, overload
 
 from gfimu.base.errors import InputError
-from gfimu.base.files.outputs import RECORDING, OutputFolder
+from gfimu.base.files.outputs import RECORDING, OutputFile, OutputFolder
 from gfimu.base.optional_packages import require
 from gfimu.commands.shell import options
 from gfimu.commands.shell.declare import Group, Option, command
-from gfimu.commands.shell.output_files import TRACE
 
 if TYPE_CHECKING:
     from firmware_bridge.board.trace import TraceCounts
@@ -45,7 +44,8 @@ _SHARE = Option("Without a port: called with the share done, 0 to 1.", shell=Fal
 _ON_OPEN = Option("With a port: called with its name when the board answers there.", shell=False)
 _FOLDER = Option("Folder to write: the image; else the package's own folder.", "FOLDER", writes=IMAGES)
 _ON_BOARD = Option("Name of the array on the board, which the board then states to the host.", "NAME", reads=True)
-_TRACE = Option("Trace to write (.vcd for GTKWave, .rrd for rerun).", "FILE", writes=TRACE, what="trace")
+_VCD_OR_RRD = OutputFile("a trace", (".vcd", ".rrd"), {".rrd": ("rerun",)})
+_TRACE = Option("Trace to write (.vcd for GTKWave, .rrd for rerun).", "FILE", writes=_VCD_OR_RRD, what="trace")
 
 
 def _run_on_shell(given: Mapping[str, Any], as_json: bool) -> None:

@@ -14,10 +14,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, cast
 
 from gfimu.base.errors import InputError
+from gfimu.base.files.outputs import OutputFile
 from gfimu.commands import given
 from gfimu.commands.shell.declare import Option, command
 from gfimu.commands.shell.options import TABLE
-from gfimu.commands.shell.output_files import COLUMN_MAP
 
 if TYPE_CHECKING:
     from gfimu.recording.importing import Inspection
@@ -25,9 +25,11 @@ if TYPE_CHECKING:
 
 __all__ = ["inspect"]
 
+_COLUMN_MAP = OutputFile("a column map", (".toml",))
 _FILE = replace(
     given.RUN, text="Text, gzipped or zipped, JSON, Parquet, Excel, MATLAB, HDF5, ULog, MCAP, ROS bag.", metavar="FILE"
 )
+_OUT = Option("Column map to write (.toml), to edit and give as --map.", "FILE", writes=_COLUMN_MAP, what="map")
 
 
 @command(report=lambda found, values: replace(found, shows_map=values["out"] is None), doing="looking at the file")
@@ -35,10 +37,7 @@ def inspect(
     file: Annotated[given.Run, _FILE],
     *,
     table: Annotated[str, TABLE.also(" By default the one with the most accelerations.")] = "",
-    out: Annotated[
-        "str | Path | None",
-        Option("Column map to write (.toml), to edit and give as --map.", "FILE", writes=COLUMN_MAP, what="map"),
-    ] = None,
+    out: Annotated["str | Path | None", _OUT] = None,
     max_memory: given.Memory = None,
 ) -> "Inspection":
     """Analyse a file of unknown layout: columns, units, rate, gaps, rails, corrupt values, chips, a map to start from.

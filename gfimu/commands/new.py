@@ -18,10 +18,10 @@ from typing import Annotated, Any
 
 from gfimu.base.declared import Declared, FileText, figure
 from gfimu.base.errors import InputError, unknown_name
-from gfimu.base.files.outputs import OutputFolder
+from gfimu.base.files.outputs import OutputFile, OutputFolder
 from gfimu.commands.file_kinds import FILE_KINDS, file_schema
 from gfimu.commands.shell.declare import Option, command
-from gfimu.commands.shell.output_files import JSON_SCHEMA, TOML_FILE
+from gfimu.commands.shell.options import SCHEMA_OUT
 
 __all__ = ["SENDER", "TEMPLATES", "new"]
 
@@ -36,8 +36,7 @@ _FOLDER = Option(
     "Of a sender: folder to write; without it, what to do with it is printed.", "[FOLDER]", argument=True,
     writes=OutputFolder(()), what=SENDER,
 )  # fmt: skip
-_OUT = Option("File to write (.toml); printed without it.", "FILE", writes=TOML_FILE)
-_SCHEMA = Option("JSON schema to write (.json), for completion in an editor.", "FILE", writes=JSON_SCHEMA)
+_OUT = Option("File to write (.toml); printed without it.", "FILE", writes=OutputFile("a TOML file", (".toml",)))
 
 
 @dataclass(frozen=True)
@@ -69,7 +68,7 @@ def new(
     folder: Annotated[str | Path | None, _FOLDER] = None,
     *,
     out: Annotated[str | Path | None, _OUT] = None,
-    schema: Annotated[str | Path | None, _SCHEMA] = None,
+    schema: Annotated[str | Path | None, SCHEMA_OUT.also(", for completion in an editor")] = None,
 ) -> str:
     """Return a commented file to edit: an array, part, column map, twin, scenario, frame, stage, plan or brief.
 

@@ -19,7 +19,7 @@ from gfimu.base.files.schema import about
 from gfimu.commands.shell.command_list import COMMANDS, declared_commands
 from gfimu.commands.shell.completion import beginning
 from gfimu.commands.shell.declare import Option, command
-from gfimu.commands.shell.output_files import JSON_SCHEMA
+from gfimu.commands.shell.options import SCHEMA_OUT
 
 __all__ = ["schema", "schema_names"]
 
@@ -79,7 +79,6 @@ def _offers(incomplete: str) -> list[tuple[str, str]]:
 
 
 _COMMAND = Option("Command: estimate, or campaign table.", "COMMAND...", kind=list[str], argument=True, offers=_offers)
-_OUT = Option("JSON schema to write (.json); printed without it.", "FILE", writes=JSON_SCHEMA)
 
 
 def _run(given: Mapping[str, Any], as_json: bool) -> None:
@@ -93,7 +92,11 @@ def _run(given: Mapping[str, Any], as_json: bool) -> None:
 
 
 @command(run=_run, results=lambda: (dict[str, Any],))
-def schema(command: Annotated[str, _COMMAND], *, out: Annotated[str | Path | None, _OUT] = None) -> dict[str, Any]:
+def schema(
+    command: Annotated[str, _COMMAND],
+    *,
+    out: Annotated[str | Path | None, SCHEMA_OUT.also("; printed without it")] = None,
+) -> dict[str, Any]:
     """Return the JSON schema (2020-12) of a command's output with ``--json``, errors included.
 
     Raises

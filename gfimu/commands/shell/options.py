@@ -7,15 +7,19 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from gfimu.base.files.outputs import RECORDING, RERUN
+from gfimu.base.files.outputs import RECORDING, RERUN, OutputFile
 from gfimu.commands.shell import completion
 from gfimu.commands.shell.declare import Group, Option
-from gfimu.commands.shell.output_files import PICTURE as PICTURE_FILE
 
 if TYPE_CHECKING:
     from gfimu.recording.importing import ColumnMap
 
 FOREIGN = "A file of another layout"
+
+
+def picture_file(*endings: str) -> OutputFile:
+    """Return the kind of output that is a picture with one of these endings."""
+    return OutputFile("a picture", endings, dict.fromkeys(endings, ("matplotlib",)), any_case=True)
 
 
 def _named(text: str, metavar: str, offers: Any, *, kind: Any = str, **settings: Any) -> Option:
@@ -33,6 +37,7 @@ CALIBRATION = Option("Calibration to apply first (.json, from gfimu calibrate)."
 CHIPS = Option("Number of chips", "N")
 DATA = Option("Folder of the measured data, for the set real.", "DIR", reads=True)
 DURATION = Option("Length of the run, s", "S")
+ESTIMATE_OUT = Option("Estimate to write (.csv, .parquet)", writes=OutputFile("an estimate", (".csv", ".parquet")))
 FORCE = Option("Go on where the checks of units, time, array and channels refuse the file")
 GRAVITY = Option("Local gravity, m/s²", "M/S²")
 GYRO = Option("Fuse the gyro columns as well")
@@ -44,7 +49,7 @@ MAX_MEMORY = Option(
     "Memory that reading a file may take, as 2GB; by default four times its size and 500 MB", "SIZE", kind=str
 )
 NOISE_UG = Option("White noise of each channel, one-sided density, µg/√Hz", "UG")
-PICTURE = Option("Picture to write (.png, .svg, .pdf)", "FILE", writes=PICTURE_FILE)
+PICTURE = Option("Picture to write (.png, .svg, .pdf)", "FILE", writes=picture_file(".png", ".svg", ".pdf"))
 PORT = Option("Port of the board", "PORT")
 PROGRESS = Option("Called with the share done, 0 to 1, and a line of text", shell=False)
 RANGE = Option("Range of the chips: ±2, 4, 8 or 16 g", "G")
@@ -54,6 +59,7 @@ RECORDING_OUT = Option("Recording to write (.csv, .parquet).", "FILE", writes=RE
 REST_THRESHOLD = Option("Threshold of rest, reading unit squared; else from the data.", "UNIT²")
 RRD = Option("Rerun recording to write (.rrd)", "FILE", writes=RERUN)
 SCENARIO = _named("Scenario: a name, or a scenario file (.toml)", "SCENARIO", completion.scenarios)
+SCHEMA_OUT = Option("JSON schema to write (.json)", "FILE", writes=OutputFile("a JSON schema", (".json",)))
 SEED = Option("Seed of everything left to chance", "N", least=0)
 SETS = Option(
     "Set of worlds; may be repeated. All that are drawn by default.",
@@ -77,19 +83,19 @@ ARRAYS = _named(
 )  # fmt: skip
 
 
+_MAP = _named("Column map: a name, or a TOML file (gfimu inspect writes one).", "MAP", completion.maps, name="--map")
+_MAP_SET = Option(
+    "Set a key of the column map, or with no --map all of it: time.column=t time.unit=ms unit=g channels.a11=ax "
+    "drop=corrupt,duplicates; may be repeated.",
+    "KEY=VALUE",
+)
+_REFERENCE_MAP = _named("Column map of the file of references.", "MAP", completion.maps)
+_REFERENCE_MAP_SET = Option("Set a key of the reference's column map; may be repeated.", "KEY=VALUE")
+
+
 def _map_from_options(
-    column_map: Annotated[
-        str | None,
-        _named("Column map: a name, or a TOML file (gfimu inspect writes one).", "MAP", completion.maps, name="--map"),
-    ] = None,
-    map_set: Annotated[
-        list[str],
-        Option(
-            "Set a key of the column map, or with no --map all of it: time.column=t time.unit=ms unit=g "
-            "channels.a11=ax drop=corrupt,duplicates; may be repeated.",
-            "KEY=VALUE",
-        ),
-    ] = (),  # type: ignore[assignment]
+    column_map: Annotated[str | None, _MAP] = None,
+    map_set: Annotated[list[str], _MAP_SET] = (),  # type: ignore[assignment]
     table: Annotated[str | None, TABLE] = None,
 ) -> "ColumnMap | None":
     """Return the map that the options of the shell say; None without any."""
@@ -116,12 +122,8 @@ MAP = replace(MAP_OF_TABLE, without=("table",))
 
 
 def _reference_map_from_options(
-    reference_map: Annotated[
-        str | None, _named("Column map of the file of references.", "MAP", completion.maps)
-    ] = None,
-    reference_map_set: Annotated[
-        list[str], Option("Set a key of the reference's column map; may be repeated.", "KEY=VALUE")
-    ] = (),  # type: ignore[assignment]
+    reference_map: Annotated[str | None, _REFERENCE_MAP] = None,
+    reference_map_set: Annotated[list[str], _REFERENCE_MAP_SET] = (),  # type: ignore[assignment]
 ) -> "ColumnMap | None":
     """Return the map of the references that the options of the shell say; None without any."""
     return _map_from_options(reference_map, reference_map_set)
