@@ -307,15 +307,13 @@ def _written_files(diagnosis: "Diagnosis", folder: str | Path) -> dict[str, Path
 
 def _twin_files(diagnosis: "Diagnosis") -> dict[str, str]:
     """Return the texts of array file and twin file where the array is no shipped one, and moves with the twin."""
-    import tomli_w
-
     from gfimu.base.files.model_files import list_models
     from sim.twin import Twin
 
     twin = diagnosis.twin
     if not isinstance(twin, Twin) or twin.array_name in list_models("arrays"):
         return {}
-    return {"twin.toml": tomli_w.dumps({**twin.to_dict(), "array": "array.toml"}), "array.toml": twin.array.to_toml()}
+    return {"twin.toml": replace(twin, array_name="array.toml").to_toml(), "array.toml": twin.array.to_toml()}
 
 
 def drawn_rig(diagnosis: "Diagnosis") -> "DrawnRig | None":

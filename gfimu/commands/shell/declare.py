@@ -217,14 +217,10 @@ class Command:
         parameters = {} if self.run is None else dict(inspect.signature(self.run).parameters)
         return {name: parameters[name] for name in marked(parameters, Option)}
 
-    @property
-    def writes(self) -> bool:
-        """Whether it can write files."""
-        return any(option.writes is not None for option in self.options.values())
-
     def names_files(self, kind: Any) -> bool:
         """Whether the files that were written are added to a result of this class, as it does not declare them."""
-        return self.writes and not (hasattr(kind, "keys") and "files" in {key.key for key in kind.keys().values()})
+        declared = hasattr(kind, "keys") and "files" in {key.key for key in kind.keys().values()}
+        return not declared and any(option.writes is not None for option in self.options.values())
 
     def check(self, given: _Given, also_read: _Given | None = None) -> None:
         """Refuse an unknown word, a number too small, and outputs that can't be written or would destroy an input."""
