@@ -109,23 +109,13 @@ def certificate(
     return found
 
 
-def _certified(
-    calibration: "Calibration", stage: "Stage | None", *, components: "Iterable[Component]" = (), **stated: Any
-) -> "Certificate":
+def _certified(calibration: "Calibration", stage: "Stage | None", **stated: Any) -> "Certificate":
     """Certify a calibration with the components of the stage, and others."""
     import numpy as np
 
-    from gfimu.calibration.certificate.certify import certify
     from gfimu.calibration.certificate.stage.components import stage_components
 
-    simulated = stage_components(calibration, stage, rng=np.random.default_rng(_SEED))
-    found = certify(
-        calibration,
-        components=(*components, *simulated.components),
-        explained_misfit=simulated.misfit,
-        **stated,
-    )
-    return replace(found, statements=(*found.statements, *simulated.statements))
+    return stage_components(calibration, stage, rng=np.random.default_rng(_SEED)).certify(calibration, **stated)
 
 
 def _other(other: "Calibration | Certificate | str | Path", name: str) -> "Certificate":
@@ -134,11 +124,8 @@ def _other(other: "Calibration | Certificate | str | Path", name: str) -> "Certi
     from gfimu.calibration.result import Calibration
     from gfimu.recording.reading import read_json
 
-    if isinstance(other, Certificate):
-        return other
-    if isinstance(other, Calibration):
-        return _certified(other, None, source=name)
-    data = read_json(other, "neither a calibration nor a certificate; make one with `gfimu calibrate`")
-    if isinstance(data, dict) and data.get("format") == FORMAT:
-        return Certificate.from_dict(data, source=name)
-    return _certified(Calibration.from_dict(data, source=name), None, source=name)
+    if isinstance(other, str | Path):
+        data = read_json(other, "neither a calibration nor a certificate; make one with `gfimu calibrate`")
+        is_certificate = isinstance(data, dict) and data.get("format") == FORMAT
+        other = (Certificate if is_certificate else Calibration).from_dict(data, source=name)
+    return other if isinstance(other, Certificate) else _certified(other, None, source=name)

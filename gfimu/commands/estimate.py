@@ -13,16 +13,15 @@ gfimu estimate run.csv --array arm.toml --axis z --lever-std-m 0.003 --rotation-
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 from gfimu.base.errors import InputError, naming
 from gfimu.commands import given
 from gfimu.commands.known_axis import AXIS, AxisLike, as_known_axis
-from gfimu.commands.place import PLACE, Place
 from gfimu.commands.shell import options
-from gfimu.commands.shell.declare import Option, command
+from gfimu.commands.shell.declare import Group, Option, command
 from gfimu.rate.registry import RATE_METHODS, rate_method
 
 if TYPE_CHECKING:
@@ -33,7 +32,7 @@ if TYPE_CHECKING:
     from gfimu.motion.estimate_summary import EstimateSummary
     from gfimu.recording import Recording
 
-__all__ = ["estimate"]
+__all__ = ["Place", "estimate"]
 
 _FILTERED = " (filter, smoother)"
 _METHOD = Option(f"Angular rate by: {', '.join(RATE_METHODS)}.", "METHOD", offers=tuple(RATE_METHODS))
@@ -50,6 +49,50 @@ _NOISE = Option(
     shell=False,
 )
 
+
+_LATITUDE = options.LATITUDE.also(": the Earth's rotation and the local gravity from it")
+_NORTH = Option("With --latitude: north from the x-axis at the start, about up, rad; else 0.", "RAD")
+
+
+@dataclass(frozen=True)
+class Place:
+    """A place on the Earth; what is None is the recording's own.
+
+    Parameters
+    ----------
+    latitude : float, optional
+        Latitude, degrees (metadata ``latitude_deg``).
+    north_rad : float, optional
+        Direction of north from the world's x-axis (for a levelled body: from its own at the start), about up, rad
+        (metadata ``north_rad``, or 0).
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> gfimu.estimate("run.parquet", place=gfimu.Place(52.0, north_rad=0.5))  # doctest: +SKIP
+    """
+
+    latitude: Annotated[float | None, _LATITUDE] = None
+    north_rad: Annotated[float | None, _NORTH] = None
+
+    def of(self, recording: "Recording") -> dict[str, Any]:
+        """Return the Earth's rotation and the gravity there as options of the estimate; none without a place.
+
+        Raises
+        ------
+        InputError
+            If north is known and the latitude is not.
+        """
+        from gfimu.motion.place import place_options
+
+        return place_options(recording, self.latitude, self.north_rad)
+
+
+_PLACE = Group(
+    Place,
+    "Where on the Earth the body is, such as ``gfimu.Place(52.0, north_rad=0.5)``: the Earth's rotation and the local "
+    "gravity from it are taken into account. By default the recording's own place, or none.",
+)
 
 _EstimatedRun: TypeAlias = "tuple[Estimate, Recording, AccelerometerArray]"
 """An estimate with the recording and the array that it was made from, calibrated where that was asked for."""
@@ -92,7 +135,7 @@ def estimate(
     unknown_start: Annotated[bool, options.UNKNOWN_START.also(_FILTERED)] = False,
     gyro: Annotated[bool, options.GYRO.also(_FILTERED)] = False,
     position: Annotated[bool, Option("Integrate to velocity and position too.")] = False,
-    place: Annotated[Place, PLACE] = Place(),
+    place: Annotated[Place, _PLACE] = Place(),
     force: Annotated[bool, options.FORCE] = False,
     keep_faulty: Annotated[bool, options.KEEP_FAULTY.also(_FILTERED)] = False,
     rrd: Annotated["str | Path | None", options.RRD] = None,
