@@ -19,7 +19,7 @@ from gfimu.base.errors import InputError
 from gfimu.base.files.outputs import OutputFile, OutputFolder
 from gfimu.base.optional_packages import require
 from gfimu.commands.shell.declare import Option, command
-from gfimu.commands.shell.options import DATA, LIMIT, SETS, SPLIT, WORKERS
+from gfimu.commands.shell.options import DATA, LIMIT, SETS, SPLIT, WORKERS, file_argument
 
 if TYPE_CHECKING:
     from sim.trials.benchmark.results import BenchmarkList, BenchmarkRun, BenchmarkWorlds
@@ -41,14 +41,10 @@ _METHOD = Option("FILE.py:function, or a method that comes with the benchmark.",
 _RUN = Option(
     "Folder to write; one that was begun is continued.", "FOLDER", writes=OutputFolder(("plan.toml", _ANSWERS))
 )
-_GIVEN = Option(
-    "Answers (.jsonl, .jsonl.xz), or folders of runs.", "ANSWERS...", kind=list[Path], argument=True, reads=True
-)
+_GIVEN = file_argument("Answers (.jsonl, .jsonl.xz), or folders of runs.", "ANSWERS...", list[Path])
 _LINES = OutputFile("a file of judged answers", (".jsonl", ".xz"))
 _JUDGED = Option("File to write: judged answers (.jsonl or .jsonl.xz).", "FILE", writes=_LINES, what="judged")
-_RESULTS = Option(
-    "Judged answers, as judge --out writes them.", "RESULTS...", kind=list[Path], argument=True, reads=True
-)
+_RESULTS = file_argument("Judged answers, as judge --out writes them.", "RESULTS...", list[Path])
 
 
 @command("benchmark list")

@@ -33,7 +33,7 @@ from gfimu.base.files.outputs import OutputFile
 from gfimu.commands import given
 from gfimu.commands.opened import as_array, as_calibration, as_runs, as_source, files_by_map, name_of
 from gfimu.commands.shell.declare import Option, command
-from gfimu.commands.shell.options import ARRAY, MAP_OF_TABLE
+from gfimu.commands.shell.options import ARRAY, MAP_OF_TABLE, file_argument
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -145,13 +145,11 @@ def _kind_of(target: "str | Path") -> str:
     return {".xml": "model", ".yaml": "calibration", ".yml": "calibration"}.get(Path(target).suffix, "recording")
 
 
-_SOURCE = Option(
+_SOURCE = file_argument(
     "Recording: .csv, .parquet, a MIMU4444 stream, or with --map a foreign file, one per chip; or a calibration "
     "(.json), or an array (a name or .toml).",
     "SOURCE...",
-    kind=list[Path],
-    argument=True,
-    reads=True,
+    list[Path],
 )
 _EXPORT = OutputFile(
     "what is converted",

@@ -17,7 +17,7 @@ from gfimu.base.errors import InputError
 from gfimu.base.files.outputs import OutputFile
 from gfimu.commands import given
 from gfimu.commands.shell.declare import Option, command
-from gfimu.commands.shell.options import TABLE
+from gfimu.commands.shell.options import TABLE, file_argument
 
 if TYPE_CHECKING:
     from gfimu.recording.importing import Inspection
@@ -26,9 +26,7 @@ if TYPE_CHECKING:
 __all__ = ["inspect"]
 
 _COLUMN_MAP = OutputFile("a column map", (".toml",))
-_FILE = replace(
-    given.RUN, text="Text, gzipped or zipped, JSON, Parquet, Excel, MATLAB, HDF5, ULog, MCAP, ROS bag.", metavar="FILE"
-)
+_FILE = file_argument("Text, gzipped or zipped, JSON, Parquet, Excel, MATLAB, HDF5, ULog, MCAP, ROS bag.", "FILE")
 _OUT = Option("Column map to write (.toml), to edit and give as --map.", "FILE", writes=_COLUMN_MAP, what="map")
 
 

@@ -14,16 +14,14 @@ from typing import TYPE_CHECKING, Annotated
 
 from gfimu.commands import given
 from gfimu.commands.shell.declare import Option, command
-from gfimu.commands.shell.options import FORCE, RECORDING_OUT
+from gfimu.commands.shell.options import FORCE, RECORDING_OUT, file_argument
 
 if TYPE_CHECKING:
     from gfimu.recording.joining import Joined, ReferenceSeries
 
 __all__ = ["join"]
 
-_REFERENCE = Option(
-    "File of the tachometer, encoder, command or gyro.", "REFERENCE", argument=True, reads=True, kind=Path
-)
+_REFERENCE = file_argument("File of the tachometer, encoder, command or gyro.", "REFERENCE")
 _RATE_ERROR = Option("Largest rate error between the clocks that is searched, a ratio.")
 
 

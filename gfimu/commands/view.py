@@ -21,7 +21,7 @@ from gfimu.base.optional_packages import require
 from gfimu.commands import given
 from gfimu.commands.known_axis import AXIS_ALONE, AxisLike, as_known_axis
 from gfimu.commands.shell.declare import Option, command
-from gfimu.commands.shell.options import FORCE
+from gfimu.commands.shell.options import FORCE, file_argument
 
 if TYPE_CHECKING:
     from gfimu.diagnosis.verdict.verdict import Diagnosis
@@ -31,10 +31,7 @@ if TYPE_CHECKING:
 
 __all__ = ["view"]
 
-_FILE = Option(
-    "A .rrd file, or a recording or estimate (.csv, .parquet, .bin) to make one from.", "FILE", kind=Path,
-    argument=True, reads=True,
-)  # fmt: skip
+_FILE = file_argument("A .rrd file, or a recording or estimate (.csv, .parquet, .bin) to make one from.", "FILE")
 _OUT = Option("Rerun recording to write (.rrd); the viewer is not opened.", writes=RERUN)
 
 

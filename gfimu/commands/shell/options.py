@@ -27,6 +27,11 @@ def _named(text: str, metavar: str, offers: Any, *, kind: Any = str, **settings:
     return Option(text, metavar, offers=offers, kind=kind, reads=True, **settings)
 
 
+def file_argument(text: str, metavar: str, kind: Any = Path) -> Option:
+    """Return the option for a file that is read and named by position; several where the kind is a list."""
+    return Option(text, metavar, kind=kind, argument=True, reads=True)
+
+
 ALLOW_CODE = Option("Let a file run the Python code that it names: only a file that you trust.")
 ARRAY = _named("Array: a name, an array file (.toml) or an MJCF file with sites (.xml)", "ARRAY", completion.arrays)
 BAUD = Option("Speed of the line, bits per second", "BAUD")
@@ -54,7 +59,7 @@ PORT = Option("Port of the board", "PORT")
 PROGRESS = Option("Called with the share done, 0 to 1, and a line of text", shell=False)
 RANGE = Option("Range of the chips: ±2, 4, 8 or 16 g", "G")
 RATE = Option("Sample rate, Hz", "HZ")
-RECORDINGS = Option("Recordings of one rig: .csv, .parquet, .bin", "RUN...", kind=list[Path], argument=True, reads=True)
+RECORDINGS = file_argument("Recordings of one rig: .csv, .parquet, .bin", "RUN...", list[Path])
 RECORDING_OUT = Option("Recording to write (.csv, .parquet).", "FILE", writes=RECORDING, what="recording")
 REST_THRESHOLD = Option("Threshold of rest, reading unit squared; else from the data.", "UNIT²")
 RRD = Option("Rerun recording to write (.rrd)", "FILE", writes=RERUN)
