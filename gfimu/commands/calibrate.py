@@ -14,7 +14,7 @@ gfimu calibrate gyro x.csv --rate-table --also y.csv --also z.csv --table-axes x
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from gfimu.array.gravity import Latitude
 from gfimu.base.errors import InputError
@@ -71,10 +71,7 @@ def _gravity_of(
 
 
 _INPUT = Option(
-    "Rows that the fit uses: averaged, raw or wavelet.",
-    "KIND",
-    name="--input",
-    offers=("averaged", "raw", "wavelet"),
+    "Rows that the fit uses: averaged, raw or wavelet.", "KIND", name="--input", offers=("averaged", "raw", "wavelet")
 )
 _THRESHOLD = Option(
     "With --input wavelet: leave out all details (none, the default), or those below the universal threshold (soft or "
@@ -221,6 +218,8 @@ def calibrate(
         others = None if check is None else checked(check)
         if others is not None:
             _refuse_the_same(run, others, name_of(check))
+        before = {name: value for name, value in vars(known).items() if value is not None}
+        before |= {name: as_calibration(before[name]) for name in ("update", "start") if name in before}
         carries = drawing is None and "array" in chosen.options
         task = CalibrationTask(
             run,
@@ -230,7 +229,7 @@ def calibrate(
             motion=turned,
             progress=progress,
             **vars(rests),
-            **_loaded(known),
+            **before,
         )
     result = run_calibration(chosen, task)
     if others is not None:
@@ -244,12 +243,6 @@ def calibrate(
 
         calibration_picture(picture, result, others or task.recording)
     return result
-
-
-def _loaded(prior: CalibrationPrior) -> dict[str, Any]:
-    """Return what is known before, calibrations read from their files; without what the task has a default for."""
-    stated = {name: value for name, value in vars(prior).items() if value is not None}
-    return stated | {name: as_calibration(stated[name]) for name in ("update", "start") if name in stated}
 
 
 def _refuse_the_same(run: "Recording", others: "Recording", name: str) -> None:

@@ -52,6 +52,7 @@ __all__ = ["convert"]
 _COUNTED = ("packets", "bytes", "dropped_rows")
 
 
+@dataclass(frozen=True)
 class _Shown(Declared):
     """Figures that are printed below the name of a file."""
 
@@ -74,7 +75,6 @@ def _left_out(why: str) -> Key:
 class Converted(_Shown):
     """A recording in another format."""
 
-    title: str
     samples: Annotated[int, figure("Samples.", head="samples")]
     channels: Annotated[int, figure("Channels.", head="channels")]
     duration_s: Annotated[float, figure("Length.", "s", head="duration", form=".9g")]
@@ -98,7 +98,6 @@ class Converted(_Shown):
 class ConvertedArray(_Shown):
     """An array as a MuJoCo model."""
 
-    title: str
     array: Annotated[str, figure("Name of the array.", head="array")]
     chips: Annotated[int, figure("Chips.", head="chips")]
     channels: Annotated[int, figure("Channels.", head="channels")]
@@ -108,7 +107,6 @@ class ConvertedArray(_Shown):
 class ConvertedCalibration(_Shown):
     """A calibration in another format."""
 
-    title: str
     format: Annotated[str, figure("kalibr or ros.", head="format")]
     method: Annotated[str, figure("Method that made the calibration.", head="method")]
     unit: Annotated[str, figure("Unit of the readings that it applies to.", head="unit")]

@@ -9,10 +9,9 @@ gfimu impact drop.csv --array nap.toml --cfc 180 --out drop_cfc180.csv --estimat
 
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from gfimu.base.files.outputs import RECORDING
 from gfimu.commands import given
 from gfimu.commands.shell.declare import Option, command
-from gfimu.commands.shell.options import ESTIMATE_OUT, FORCE
+from gfimu.commands.shell.options import ESTIMATE_OUT, FORCE, RECORDING_OUT
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -21,7 +20,6 @@ if TYPE_CHECKING:
 
 __all__ = ["impact"]
 
-_FILTERED = "Recording to write (.csv, .parquet): channels zeroed and filtered, from time zero."
 _RECORDING = given.RUN.also(" with the impact, the largest in it: .csv, .parquet; another with --map.")
 _DIRECTION = Option("Where the body is accelerated (+x, -x, …): the polarity is checked.")
 
@@ -38,7 +36,7 @@ def impact(
     calibration: given.CalibrationToApply = None,
     column_map: given.Map = None,
     max_memory: given.Memory = None,
-    out: Annotated["str | Path | None", Option(_FILTERED, writes=RECORDING, what="recording")] = None,
+    out: Annotated["str | Path | None", RECORDING_OUT.also(": channels zeroed and filtered, from time zero")] = None,
     estimate: Annotated["str | Path | None", ESTIMATE_OUT.also(": p, α, ω from time zero")] = None,
     picture: given.Picture = None,
     force: Annotated[bool, FORCE] = False,

@@ -99,12 +99,11 @@ def as_source(
         recording = with_memory(recording, max_memory)
         return recording if column_map is None else files_by_map([recording], column_map)
     if isinstance(recording, MappedFile):
-        recording = recording.with_memory(max_memory)
-    if column_map is None:
-        return recording
-    if isinstance(recording, MappedFile):
-        return replace(recording, column_map=load_map(column_map))
-    raise InputError("a map is for a file, and this recording has been read already; give its file")
+        bounded = recording.with_memory(max_memory)
+        return bounded if column_map is None else replace(bounded, column_map=load_map(column_map))
+    if column_map is not None:
+        raise InputError("a map is for a file, and this recording has been read already; give its file")
+    return recording
 
 
 def is_arrays(recording: object) -> TypeGuard[tuple[ArrayLike, ArrayLike]]:
@@ -144,12 +143,9 @@ def as_calibrated_run(
     Without an array it is the recording's own.
     """
     from gfimu.calibration.run_file import open_calibrated_run
-    from gfimu.recording.formats import open_run
 
-    given = None if array is None else as_array(array)
-    if calibration is None:
-        return open_run(recording, given)
-    return open_calibrated_run(recording, as_calibration(calibration), given)
+    unit = None if calibration is None else as_calibration(calibration)
+    return open_calibrated_run(recording, unit, None if array is None else as_array(array))
 
 
 def as_twin(twin: WorldModel | str | Path, *, allow_code: bool) -> WorldModel:

@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from firmware_bridge.host.record_report import RecordReport
     from firmware_bridge.host.recorder import Batch
     from gfimu.array.array import AccelerometerArray
-    from gfimu.visual.live import LivePicture
 
 __all__ = ["record"]
 
@@ -140,10 +139,16 @@ def record(
         if view is not None or not (has_picture or callbacks.on_text is not None or callbacks.on_fault is not None):
             return
         if array is not None:
+            picture = None
+            if has_picture:
+                viewer.quiet_sdk()
+                from gfimu.visual.live import LivePicture  # imports the SDK
+
+                picture = LivePicture(array)
             view = LiveView(
                 array, form.count_size(array), on_text=callbacks.on_text, on_fault=callbacks.on_fault,
                 on_note=callbacks.on_note, rrd=None if rrd is None else Path(rrd), viewer=viewer if live else None,
-                picture=_picture(array) if has_picture else None,
+                picture=picture,
             )  # fmt: skip
         elif has_picture:
             raise InputError("--live and --rrd draw the array, which the board does not state; give it with --array")
@@ -173,12 +178,3 @@ def record(
         warn(f"{report.path}: {text}")
     faults = () if view is None else view.faults
     return replace(report, faults=tuple(entry for fault in faults for entry in fault.entries()))
-
-
-def _picture(array: "AccelerometerArray") -> "LivePicture":
-    from gfimu.visual.viewer import quiet_sdk
-
-    quiet_sdk()
-    from gfimu.visual.live import LivePicture
-
-    return LivePicture(array)

@@ -60,7 +60,7 @@ PROGRESS = Option("Called with the share done, 0 to 1, and a line of text", shel
 RANGE = Option("Range of the chips: ±2, 4, 8 or 16 g", "G")
 RATE = Option("Sample rate, Hz", "HZ")
 RECORDINGS = file_argument("Recordings of one rig: .csv, .parquet, .bin", "RUN...", list[Path])
-RECORDING_OUT = Option("Recording to write (.csv, .parquet).", "FILE", writes=RECORDING, what="recording")
+RECORDING_OUT = Option("Recording to write (.csv, .parquet)", "FILE", writes=RECORDING, what="recording")
 REST_THRESHOLD = Option("Threshold of rest, reading unit squared; else from the data.", "UNIT²")
 RRD = Option("Rerun recording to write (.rrd)", "FILE", writes=RERUN)
 SCENARIO = _named("Scenario: a name, or a scenario file (.toml)", "SCENARIO", completion.scenarios)
