@@ -176,6 +176,8 @@ def calibrate(
     >>> gfimu.calibrate("array", poses)
     Calibration(array, 12 channels in m/s², 60 parameters, 3 directions undetermined)
     """
+    import numpy as np
+
     from gfimu.base.units import STANDARD_GRAVITY
     from gfimu.calibration.check_poses import check_on_poses
     from gfimu.calibration.method import CalibrationTask, run_calibration
@@ -217,7 +219,9 @@ def calibrate(
         turned = None if motion is None else checked(motion)
         others = None if check is None else checked(check)
         if others is not None:
-            _refuse_the_same(run, others, name_of(check))
+            same = run.channels == others.channels and np.array_equal(run.readings, others.readings, equal_nan=True)
+            if same:
+                raise InputError(f"{name_of(check)}: this is the recording of the fit; --check needs other poses")
         before = {name: value for name, value in vars(known).items() if value is not None}
         before |= {name: as_calibration(before[name]) for name in ("update", "start") if name in before}
         carries = drawing is None and "array" in chosen.options
@@ -243,14 +247,6 @@ def calibrate(
 
         calibration_picture(picture, result, others or task.recording)
     return result
-
-
-def _refuse_the_same(run: "Recording", others: "Recording", name: str) -> None:
-    """Refuse to check a calibration on what it was made from."""
-    import numpy as np
-
-    if run.channels == others.channels and np.array_equal(run.readings, others.readings, equal_nan=True):
-        raise InputError(f"{name}: this is the recording of the fit; --check needs other poses")
 
 
 def _refuse_unused(method: "CalibrationMethod", asked: Mapping[str, object]) -> None:

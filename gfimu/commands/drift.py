@@ -20,7 +20,7 @@ from gfimu.commands import given
 from gfimu.commands.known_axis import AXIS_ALONE, AxisLike, KnownAxis, as_known_axis
 from gfimu.commands.opened import as_array, as_calibrated_run, as_source, name_of
 from gfimu.commands.shell import options
-from gfimu.commands.shell.declare import Command, Option, command, command_of
+from gfimu.commands.shell.declare import Option, command, command_of
 
 if TYPE_CHECKING:
     from gfimu.budget.drift.equivalent import EquivalentErrors
@@ -154,41 +154,37 @@ def axis_drift(
 
 
 def _run(values: Mapping[str, Any], as_json: bool) -> None:
-    """Call the function that the options are of, and print what it gives."""
+    """Call the function that the options are of, and print what it gives; refuse an option that is of another one."""
     from gfimu.commands.shell.printing import print_report
 
-    declared = _meant(values)
-    print_report(declared, declared.taken(values), as_json=as_json)
-
-
-def _meant(values: Mapping[str, Any]) -> Command:
-    """Return what the options are of; raises `InputError` for one that is of something else."""
     functions = tuple(command_of(function) for function in (drift, drift_of_rest, drift_from_position, axis_drift))
     of_body, of_rest, of_position, of_axis = functions
     usual = {name: parameter.default for one in functions for name, parameter in one.parameters.items()}
     used = {name for name, default in usual.items() if values.get(name) not in (default, None, KnownAxis())}
     if values["recording"] is not None:
-        if used - of_rest.parameters.keys():
+        meant = of_rest
+        if used - meant.parameters.keys():
             raise InputError(
                 f"{values['recording']}: the drift of a recording goes with --array, --calibration, --duration, "
                 "--lead, --gravity, --picture, --map and --force; its noise is measured"
             )
-        return of_rest
-    if used & _OF_RECORDINGS:
+    elif used & _OF_RECORDINGS:
         raise InputError("--lead, --calibration, --picture, --map and --force are of a recording; name it first")
-    if values["from_position"] is not None:
-        if used - of_position.parameters.keys():
+    elif values["from_position"] is not None:
+        meant = of_position
+        if used - meant.parameters.keys():
             raise InputError(
                 "--from-position works errors out; give it with --duration, --known-bias-mg, --latitude, --gravity"
             )
-        return of_position
-    if used & _OF_POSITIONS:
+    elif used & _OF_POSITIONS:
         raise InputError("--known-bias-mg and --latitude go with --from-position")
-    if values["axis"].of(as_array(values["array"] or _USUAL)) is None:
-        return of_body
-    if used & _OF_FREE_BODIES:
-        raise InputError("--rate-drift-deg-h, --offset and --monte-carlo have no use with a known axis (--axis)")
-    return of_axis
+    elif values["axis"].of(as_array(values["array"] or _USUAL)) is None:
+        meant = of_body
+    else:
+        meant = of_axis
+        if used & _OF_FREE_BODIES:
+            raise InputError("--rate-drift-deg-h, --offset and --monte-carlo have no use with a known axis (--axis)")
+    print_report(meant, meant.taken(values), as_json=as_json)
 
 
 @command(doing="Monte Carlo", run=_run, parts=(drift_of_rest, drift_from_position, axis_drift))
