@@ -101,6 +101,7 @@ if TYPE_CHECKING:
     from gfimu.commands.drift import drift as drift
     from gfimu.commands.drift import drift_from_position as drift_from_position
     from gfimu.commands.drift import drift_of_rest as drift_of_rest
+    from gfimu.commands.estimate import Place as Place
     from gfimu.commands.estimate import estimate as estimate
     from gfimu.commands.impact import impact as impact
     from gfimu.commands.inspect import inspect as inspect
@@ -110,7 +111,6 @@ if TYPE_CHECKING:
     from gfimu.commands.new import new as new
     from gfimu.commands.noise import noise as noise
     from gfimu.commands.optimize import optimize as optimize
-    from gfimu.commands.place import Place as Place
     from gfimu.commands.record import record as record
     from gfimu.commands.record_settings import BoardSettings as BoardSettings
     from gfimu.commands.record_settings import RecordCallbacks as RecordCallbacks

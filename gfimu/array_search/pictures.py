@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -14,17 +15,31 @@ from gfimu.array.array import AccelerometerArray
 from gfimu.array_search.front import CHIPS, Front
 from gfimu.array_search.problem import Problem, Sites
 from gfimu.array_search.shapes import Shape
+from gfimu.base.files.atomic_file import write_text
 from gfimu.base.results import save_figure
 from gfimu.base.results.colours import AFTER_ON_PAPER, BEFORE_ON_PAPER, INK, NOISE_ON_PAPER, PALE, chip_colour, css
 
-__all__ = ["array_picture", "front_picture"]
+__all__ = ["array_picture", "write_front"]
 
 _ARROW = 0.32  # of half the longest edge: length of a sensing axis
 _MM = 1e3
 _DPI = 130
 
 
-def front_picture(path: str | Path, front: Front) -> None:
+def write_front(folder: str | Path, front: Front) -> None:
+    """Write the folder of a front: an array file per point, the table, the picture; a former front's files go."""
+    folder = Path(folder)
+    folder.mkdir(exist_ok=True)
+    files = [folder / f"{point.name}.toml" for point in front.points]
+    for file, point in zip(files, front.points, strict=True):
+        write_text(file, point.array.to_toml())
+    write_text(folder / "front.json", json.dumps(front.to_dict(), indent=2) + "\n")
+    _front_picture(folder / "front.png", front)
+    for former in set(folder.glob("front_[0-9][0-9].toml")).difference(files):  # that one may have had more points
+        former.unlink()
+
+
+def _front_picture(path: Path, front: Front) -> None:
     """Draw the front: one dot per array, and the proven bounds of the figures."""
     figure = Figure(figsize=(7.2, 4.8), layout="constrained")
     axes = figure.subplots()

@@ -72,9 +72,11 @@ def open_calibrated(path: RecordingSource, calibration: Calibration | None) -> R
 
 
 def open_calibrated_run(
-    path: RecordingSource, calibration: Calibration, array: AccelerometerArray | None = None
+    path: RecordingSource, calibration: Calibration | None, array: AccelerometerArray | None = None
 ) -> tuple[Recording, AccelerometerArray]:
-    """Read a recording with its array and correct both: readings by the error models, positions where fitted.
+    """Read a recording with its array and correct both by a calibration, where there is one.
+
+    Readings are corrected by the error models, positions where they were fitted.
 
     Raises
     ------
@@ -82,6 +84,8 @@ def open_calibrated_run(
         As `gfimu.recording.formats.open_run`, or if the calibration does not fit the recording.
     """
     recording, geometry = open_run(path, array)
+    if calibration is None:
+        return recording, geometry
     if calibration.unit == "lsb" and not isinstance(path, Recording):
         if isinstance(path, MappedFile):
             recording = path.read(geometry, unit="lsb")

@@ -19,7 +19,7 @@ from gfimu.base.errors import InputError
 from gfimu.base.files.outputs import OutputFile, OutputFolder
 from gfimu.base.optional_packages import require
 from gfimu.commands.shell.declare import Option, command
-from gfimu.commands.shell.options import DATA, LIMIT, SETS, SPLIT, WORKERS
+from gfimu.commands.shell.options import DATA, LIMIT, SETS, SPLIT, WORKERS, file_argument
 
 if TYPE_CHECKING:
     from sim.trials.benchmark.results import BenchmarkList, BenchmarkRun, BenchmarkWorlds
@@ -33,7 +33,6 @@ OWN = "gfimu"
 _ANSWERS = "answers.jsonl"
 _SCHEMA = "answer.schema.json"
 _PROGRESS = Option("Called with the number of worlds that are done and of all.", shell=False)
-_TYPE = Option("Type of the recordings.", "TYPE")
 _WORLDS = Option(
     "Folder to write: a folder per world, such as own/dev/007, and the schema of answers.", "FOLDER",
     writes=OutputFolder((_SCHEMA,)),
@@ -42,16 +41,10 @@ _METHOD = Option("FILE.py:function, or a method that comes with the benchmark.",
 _RUN = Option(
     "Folder to write; one that was begun is continued.", "FOLDER", writes=OutputFolder(("plan.toml", _ANSWERS))
 )
-_NAME = Option("Name in tables; that of the file by default.", "NAME")
-_GIVEN = Option(
-    "Answers (.jsonl, .jsonl.xz), or folders of runs.", "ANSWERS...", kind=list[Path], argument=True, reads=True
-)
+_GIVEN = file_argument("Answers (.jsonl, .jsonl.xz), or folders of runs.", "ANSWERS...", list[Path])
 _LINES = OutputFile("a file of judged answers", (".jsonl", ".xz"))
 _JUDGED = Option("File to write: judged answers (.jsonl or .jsonl.xz).", "FILE", writes=_LINES, what="judged")
-_PARTIAL = Option("Leave out worlds without an answer, instead of counting them as errors.")
-_RESULTS = Option(
-    "Judged answers, as judge --out writes them.", "RESULTS...", kind=list[Path], argument=True, reads=True
-)
+_RESULTS = file_argument("Judged answers, as judge --out writes them.", "RESULTS...", list[Path])
 
 
 @command("benchmark list")
@@ -98,7 +91,7 @@ def worlds(
     sets: Annotated[Sequence[str], SETS] = (),
     split: Annotated[Literal["dev", "test"], SPLIT] = "dev",
     limit: Annotated[int | None, LIMIT] = None,
-    file_type: Annotated[Literal["parquet", "csv"], _TYPE] = "parquet",
+    file_type: Annotated[Literal["parquet", "csv"], Option("Type of the recordings.", "TYPE")] = "parquet",
     progress: Annotated[Callable[[int, int], None] | None, _PROGRESS] = None,
 ) -> list[Path]:
     """Write worlds as plain files, for a method in any language: a recording and a twin each, no truth.
@@ -139,7 +132,7 @@ def run(
     sets: Annotated[Sequence[str], SETS] = (),
     split: Annotated[Literal["dev", "test"], SPLIT] = "dev",
     limit: Annotated[int | None, LIMIT] = None,
-    name: Annotated[str, _NAME] = "",
+    name: Annotated[str, Option("Name in tables; that of the file by default.", "NAME")] = "",
     workers: Annotated[int | None, WORKERS] = None,
     data: Annotated[str | Path | None, DATA] = None,
     progress: Annotated[Callable[[int, int], None] | None, _PROGRESS] = None,
@@ -192,7 +185,7 @@ def judge(
     answers: Annotated[str | Path | Sequence[str | Path], _GIVEN],
     *,
     out: Annotated[str | Path | None, _JUDGED] = None,
-    partial: Annotated[bool, _PARTIAL] = False,
+    partial: Annotated[bool, Option("Leave out worlds without an answer, instead of counting them as errors.")] = False,
     data: Annotated[str | Path | None, DATA] = None,
 ) -> "Judgement":
     """Judge answers by the truth: right, in a set, unknown, missed, wrong; sizes, prediction, time.

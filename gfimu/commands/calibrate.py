@@ -14,17 +14,18 @@ gfimu calibrate gyro x.csv --rate-table --also y.csv --also z.csv --table-axes x
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
+from gfimu.array.gravity import Latitude
 from gfimu.base.errors import InputError
+from gfimu.base.files.outputs import OutputFile
+from gfimu.calibration.given import CalibrationPoses, CalibrationPrior, RateTable
 from gfimu.commands import given
-from gfimu.commands.shell import completion, options
+from gfimu.commands.opened import as_array, as_calibrated_run, as_calibration, as_source, name_of
+from gfimu.commands.shell import options
 from gfimu.commands.shell.declare import Group, Option, command
-from gfimu.commands.shell.output_files import CALIBRATION
 
 if TYPE_CHECKING:
-    from gfimu.array.gravity import Latitude
-    from gfimu.calibration.given import CalibrationPoses, CalibrationPrior, RateTable
     from gfimu.calibration.method import CalibrationMethod
     from gfimu.calibration.result import Calibration
     from gfimu.recording import Recording
@@ -51,9 +52,9 @@ _METHODS = (
 )  # fmt: skip
 """Those of `gfimu.calibration.registry`, in its order; that has the functions, and help does not wait for scipy."""
 
-_METHOD = Option(f"Method: {', '.join(_METHODS)}.", "METHOD", offers=completion.words(*_METHODS), argument=True)
-_OUT = Option("Calibration to write (.json).", writes=CALIBRATION, what="calibration", needed=True)
-_PARAMETERS = Option("Per chip: 12 (full matrix) or 9 (triangular).")
+_CALIBRATION_FILE = OutputFile("a calibration", (".json",))
+_OUT = Option("Calibration to write (.json).", writes=_CALIBRATION_FILE, what="calibration", needed=True)
+_RECORDING = given.RUN.also(" of static poses: .csv, .parquet, a MIMU4444 stream, or text rows time x y z.")
 _MOTION = Option("array: recording of the motion, or of shakes (may be RUN).", kind=Path, reads=True)
 _CHECK = Option("Other poses at rest, which the fit does not see: norm of a minus g on them.", kind=Path, reads=True)
 _PROGRESS = Option("Called with the share done of a fit to shakes, 0 to 1.", shell=False)
@@ -63,19 +64,14 @@ def _gravity_of(
     gravity: Annotated[float | None, options.GRAVITY] = None,
     latitude: Annotated[float | None, options.LATITUDE.also(": gravity from it")] = None,
     height: Annotated[float, Option("Height above the ellipsoid, m.")] = 0.0,
-) -> "Latitude | float | None":
-    from gfimu.array.gravity import Latitude
-
+) -> Latitude | float | None:
     if gravity is not None and latitude is not None:
         raise InputError("give --gravity or --latitude, not both")
     return gravity if latitude is None else Latitude(latitude, height)
 
 
 _INPUT = Option(
-    "Rows that the fit uses: averaged, raw or wavelet.",
-    "KIND",
-    name="--input",
-    offers=completion.words("averaged", "raw", "wavelet"),
+    "Rows that the fit uses: averaged, raw or wavelet.", "KIND", name="--input", offers=("averaged", "raw", "wavelet")
 )
 _THRESHOLD = Option(
     "With --input wavelet: leave out all details (none, the default), or those below the universal threshold (soft or "
@@ -90,9 +86,7 @@ def _poses_of(
     rest_threshold: Annotated[float | None, options.REST_THRESHOLD] = None,
     min_rest: Annotated[float | None, Option("Shortest pose, s; 1 by default, 2 for array.")] = None,
     levelling_std: Annotated[float | None, Option("Standard deviation of a pose's tilt per axis, rad.")] = None,
-) -> "CalibrationPoses":
-    from gfimu.calibration.given import CalibrationPoses
-
+) -> CalibrationPoses:
     stated = {"level": wavelet_level, "threshold": wavelet_threshold}
     wavelet = {key: value for key, value in stated.items() if value is not None}
     return CalibrationPoses(rest_threshold, min_rest, levelling_std, input_kind, wavelet)
@@ -113,9 +107,7 @@ def _prior_of(
     calibration: Annotated[Path | None, _START] = None,
     radius_std: Annotated[float | None, _RADIUS] = None,
     stretch_std: Annotated[float | None, _STRETCH] = None,
-) -> "CalibrationPrior":
-    from gfimu.calibration.given import CalibrationPrior
-
+) -> CalibrationPrior:
     return CalibrationPrior(update, calibration, turn_on_std, bias_walk, radius_std, stretch_std)
 
 
@@ -127,9 +119,7 @@ def _rate_table_of(
     rate_table: Annotated[bool, Option("gyro: RUN is of a rate table, whose tachometer is the reference.")] = False,
     also: Annotated[list[Path], _ALSO] = (),  # type: ignore[assignment]
     table_axes: Annotated[str, _AXES] = "",
-) -> "RateTable | None":
-    from gfimu.calibration.given import RateTable
-
+) -> RateTable | None:
     if not (rate_table or also or table_axes):
         return None
     return RateTable(tuple(also), tuple(filter(None, table_axes.split(","))))
@@ -153,15 +143,13 @@ _RATE_TABLE = Group(
 
 @command(doing="calibrating")
 def calibrate(
-    method: Annotated[str, _METHOD],
-    recording: Annotated[
-        given.Run, given.RUN.also(" of static poses: .csv, .parquet, a MIMU4444 stream, or text rows time x y z.")
-    ],
+    method: Annotated[str, Option(f"Method: {', '.join(_METHODS)}.", "METHOD", offers=_METHODS, argument=True)],
+    recording: Annotated[given.Run, _RECORDING],
     *,
     out: Annotated["str | Path | None", _OUT] = None,
     array: given.Array = None,
     gravity: Annotated["Latitude | float | None", _GRAVITY] = None,
-    parameters: Annotated[int | None, _PARAMETERS] = None,
+    parameters: Annotated[int | None, Option("Per chip: 12 (full matrix) or 9 (triangular).")] = None,
     poses: Annotated["CalibrationPoses | None", _POSES] = None,
     motion: Annotated["RecordingLike | None", _MOTION] = None,
     prior: Annotated["CalibrationPrior | None", _PRIOR] = None,
@@ -188,14 +176,13 @@ def calibrate(
     >>> gfimu.calibrate("array", poses)
     Calibration(array, 12 channels in m/s², 60 parameters, 3 directions undetermined)
     """
-    from gfimu.array.gravity import Latitude
+    import numpy as np
+
     from gfimu.base.units import STANDARD_GRAVITY
     from gfimu.calibration.check_poses import check_on_poses
-    from gfimu.calibration.given import CalibrationPoses, CalibrationPrior, RateTable
     from gfimu.calibration.method import CalibrationTask, run_calibration
     from gfimu.calibration.registry import calibration_method
     from gfimu.calibration.run_file import open_references, open_uncalibrated
-    from gfimu.commands.opened import as_array, as_calibrated_run, as_source, name_of
     from gfimu.recording.checks import examine
 
     rests, known = poses or CalibrationPoses(), prior or CalibrationPrior()
@@ -215,6 +202,7 @@ def calibrate(
         examine(read, drawing, source=name_of(item), force=force)
         return read
 
+    others: Recording | None = None
     if "rate_table" in chosen.options:
         if check is not None or picture is not None or drawing is not None or gravity is not latitude:
             raise InputError(
@@ -226,26 +214,27 @@ def calibrate(
         mounted = RateTable(also, table.axes, [name_of(item) for item in files])
         degrees = None if latitude is None else latitude.deg
         task = CalibrationTask(first, latitude_deg=degrees, rate_table=mounted, **vars(rests))
-        result = run_calibration(chosen, task)
-        if out is not None:
-            result.save(out)
-        return result
-    run = checked(recording)
-    turned = None if motion is None else checked(motion)
-    others = None if check is None else checked(check)
-    if others is not None:
-        _refuse_the_same(run, others, name_of(check))
-    carries = drawing is None and "array" in chosen.options
-    task = CalibrationTask(
-        run,
-        gravity=STANDARD_GRAVITY if local_gravity is None else local_gravity,
-        n_parameters=parameters,
-        array=as_calibrated_run(source_of(recording), None)[1] if carries else drawing,
-        motion=turned,
-        progress=progress,
-        **vars(rests),
-        **_loaded(known),
-    )
+    else:
+        run = checked(recording)
+        turned = None if motion is None else checked(motion)
+        others = None if check is None else checked(check)
+        if others is not None:
+            same = run.channels == others.channels and np.array_equal(run.readings, others.readings, equal_nan=True)
+            if same:
+                raise InputError(f"{name_of(check)}: this is the recording of the fit; --check needs other poses")
+        before = {name: value for name, value in vars(known).items() if value is not None}
+        before |= {name: as_calibration(before[name]) for name in ("update", "start") if name in before}
+        carries = drawing is None and "array" in chosen.options
+        task = CalibrationTask(
+            run,
+            gravity=STANDARD_GRAVITY if local_gravity is None else local_gravity,
+            n_parameters=parameters,
+            array=as_calibrated_run(source_of(recording), None)[1] if carries else drawing,
+            motion=turned,
+            progress=progress,
+            **vars(rests),
+            **before,
+        )
     result = run_calibration(chosen, task)
     if others is not None:
         rested = {} if task.min_rest_s is None else {"min_rest_s": task.min_rest_s}
@@ -256,24 +245,8 @@ def calibrate(
     if picture is not None:
         from gfimu.calibration.pictures import calibration_picture
 
-        calibration_picture(picture, result, others or run)
+        calibration_picture(picture, result, others or task.recording)
     return result
-
-
-def _loaded(prior: "CalibrationPrior") -> dict[str, Any]:
-    """Return what is known before, calibrations read from their files; without what the task has a default for."""
-    from gfimu.commands.opened import as_calibration
-
-    stated = {name: value for name, value in vars(prior).items() if value is not None}
-    return stated | {name: as_calibration(stated[name]) for name in ("update", "start") if name in stated}
-
-
-def _refuse_the_same(run: "Recording", others: "Recording", name: str) -> None:
-    """Refuse to check a calibration on what it was made from."""
-    import numpy as np
-
-    if run.channels == others.channels and np.array_equal(run.readings, others.readings, equal_nan=True):
-        raise InputError(f"{name}: this is the recording of the fit; --check needs other poses")
 
 
 def _refuse_unused(method: "CalibrationMethod", asked: Mapping[str, object]) -> None:

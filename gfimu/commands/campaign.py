@@ -17,25 +17,20 @@ from typing import TYPE_CHECKING, Annotated, Any
 from gfimu.base.errors import InputError
 from gfimu.base.files.outputs import OutputFile, OutputFolder
 from gfimu.commands.shell.declare import Option, command
-from gfimu.commands.shell.options import BY, WORKERS
+from gfimu.commands.shell.options import BY, WORKERS, picture_file
 
 if TYPE_CHECKING:
     from sim.trials.sweep.results import CampaignPlot, CampaignResult, CampaignStatus, CampaignTable
 
 __all__ = ["campaign", "campaign_plot", "campaign_status", "campaign_table"]
 
-_PICTURE = OutputFile(
-    "a picture", (".png", ".svg", ".html"), dict.fromkeys((".png", ".svg", ".html"), ("matplotlib",)), any_case=True
-)
 _PLAN = Option("Plan (.toml), or the folder of a campaign, of which nothing is run.", "PLAN", argument=True, reads=True)
 _OUT = Option("Folder to write; one that was begun is continued.", writes=OutputFolder(("plan.toml",)), what="campaign")
-_WORKERS = WORKERS.also("; with --cluster slurm, jobs", least=1)
-_CLUSTER = Option("Dask scheduler instead, such as tcp://host:8786, or slurm.")
 _PROGRESS = Option("Called with the number of cases that are done and of all.", shell=False)
 _FOLDER = Option("Folder of the campaign.", "DIR", argument=True, reads=True)
 _TABLE = OutputFile("a table", (".csv",))
 _CSV = Option("File to write: the quantiles, one row per group.", "FILE", writes=_TABLE, what="quantiles")
-_DRAWING = Option("Picture to write (.png, .svg, .html).", writes=_PICTURE, what="picture")
+_DRAWING = Option("Picture to write (.png, .svg, .html).", writes=picture_file(".png", ".svg", ".html"), what="picture")
 _RESULT = Option("Result to draw; may be repeated. The first four by default.", "NAME", kind=list[str])
 
 
@@ -54,8 +49,8 @@ def campaign(
     *,
     out: Annotated[str | Path | None, _OUT] = None,
     by: Annotated[Sequence[str], BY] = (),
-    workers: Annotated[int | None, _WORKERS] = None,
-    cluster: Annotated[str, _CLUSTER] = "",
+    workers: Annotated[int | None, WORKERS.also("; with --cluster slurm, jobs", least=1)] = None,
+    cluster: Annotated[str, Option("Dask scheduler instead, such as tcp://host:8786, or slurm.")] = "",
     progress: Annotated[Callable[[int, int], None] | None, _PROGRESS] = None,
 ) -> "CampaignResult":
     """Run the cases of a plan that its folder lacks, and summarise them; or summarise a folder.

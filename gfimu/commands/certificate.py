@@ -17,13 +17,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from gfimu.base.files.outputs import OutputFolder
+from gfimu.calibration.certificate.stage.stage import Stage
 from gfimu.commands import given
 from gfimu.commands.shell.declare import Option, command
 from gfimu.commands.shell.options import ARRAY
 
 if TYPE_CHECKING:
     from gfimu.calibration.certificate.certificate import Certificate, Component, Sheet
-    from gfimu.calibration.certificate.stage.stage import Stage
     from gfimu.calibration.result import Calibration
     from gfimu.recording.mapped import RecordingLike
 
@@ -36,6 +36,7 @@ FOLDER = OutputFolder(("certificate.json", "certificate.html"), meanings=("certi
 """What a certificate writes."""
 
 _CALIBRATION = Option("Calibration file, from `gfimu calibrate`.", "CAL", argument=True, reads=True)
+_OUT = Option("Folder to write: certificate.json, certificate.html.", writes=FOLDER)
 _COMPARE = Option("Another calibration or certificate of the same chips: E_n of each quantity.", reads=True)
 _STAGE = Option("Errors of stage and gravity, for the budget (.toml); gfimu new stage writes one to edit.", reads=True)
 _REST = Option(
@@ -49,9 +50,7 @@ _SENSOR = Option("The array as an angular sensor, in place of ``array`` and ``re
 def certificate(
     calibration: Annotated["Calibration | str | Path", _CALIBRATION],
     *,
-    out: Annotated[
-        "str | Path | None", Option("Folder to write: certificate.json, certificate.html.", writes=FOLDER)
-    ] = None,
+    out: Annotated["str | Path | None", _OUT] = None,
     compare: Annotated["Calibration | Certificate | str | Path | None", _COMPARE] = None,
     stage: Annotated["Stage | str | Path | None", _STAGE] = None,
     array: Annotated[given.Array, ARRAY.also(". Adds its sheet as an angular sensor (IEEE 671)")] = None,
@@ -83,7 +82,6 @@ def certificate(
     from gfimu.calibration.certificate.angular import angular_sensor_sheet
     from gfimu.calibration.certificate.comparison import compare as compared
     from gfimu.calibration.certificate.page import write_certificate
-    from gfimu.calibration.certificate.stage.stage import Stage
     from gfimu.commands.opened import as_array, as_calibrated_run, as_calibration, as_source
 
     fitted = as_calibration(calibration)
@@ -111,23 +109,13 @@ def certificate(
     return found
 
 
-def _certified(
-    calibration: "Calibration", stage: "Stage | None", *, components: "Iterable[Component]" = (), **stated: Any
-) -> "Certificate":
+def _certified(calibration: "Calibration", stage: "Stage | None", **stated: Any) -> "Certificate":
     """Certify a calibration with the components of the stage, and others."""
     import numpy as np
 
-    from gfimu.calibration.certificate.certify import certify
     from gfimu.calibration.certificate.stage.components import stage_components
 
-    simulated = stage_components(calibration, stage, rng=np.random.default_rng(_SEED))
-    found = certify(
-        calibration,
-        components=(*components, *simulated.components),
-        explained_misfit=simulated.misfit,
-        **stated,
-    )
-    return replace(found, statements=(*found.statements, *simulated.statements))
+    return stage_components(calibration, stage, rng=np.random.default_rng(_SEED)).certify(calibration, **stated)
 
 
 def _other(other: "Calibration | Certificate | str | Path", name: str) -> "Certificate":
@@ -136,11 +124,8 @@ def _other(other: "Calibration | Certificate | str | Path", name: str) -> "Certi
     from gfimu.calibration.result import Calibration
     from gfimu.recording.reading import read_json
 
-    if isinstance(other, Certificate):
-        return other
-    if isinstance(other, Calibration):
-        return _certified(other, None, source=name)
-    data = read_json(other, "neither a calibration nor a certificate; make one with `gfimu calibrate`")
-    if isinstance(data, dict) and data.get("format") == FORMAT:
-        return Certificate.from_dict(data, source=name)
-    return _certified(Calibration.from_dict(data, source=name), None, source=name)
+    if isinstance(other, str | Path):
+        data = read_json(other, "neither a calibration nor a certificate; make one with `gfimu calibrate`")
+        is_certificate = isinstance(data, dict) and data.get("format") == FORMAT
+        other = (Certificate if is_certificate else Calibration).from_dict(data, source=name)
+    return other if isinstance(other, Certificate) else _certified(other, None, source=name)

@@ -21,24 +21,26 @@ gfimu convert mine.toml mine.xml --to motor_turntable
 """
 
 import os
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
+from gfimu.base.declared import Declared, Key, Table, figure, figures
 from gfimu.base.errors import InputError, unknown_name
+from gfimu.base.files.atomic_file import write_text
+from gfimu.base.files.outputs import OutputFile
 from gfimu.commands import given
-from gfimu.commands.shell.completion import words
+from gfimu.commands.opened import as_array, as_calibration, as_runs, as_source, files_by_map, name_of
 from gfimu.commands.shell.declare import Option, command
-from gfimu.commands.shell.options import ARRAY, MAP_OF_TABLE
-from gfimu.commands.shell.output_files import EXPORT
+from gfimu.commands.shell.options import ARRAY, MAP_OF_TABLE, file_argument
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-    from typing import Any
+    from collections.abc import Sequence
 
     from gfimu.array.array import AccelerometerArray
     from gfimu.base.files.memory import MemorySize
     from gfimu.calibration.result import Calibration
-    from gfimu.commands.converted import Converted, ConvertedArray, ConvertedCalibration
     from gfimu.recording import Recording
     from gfimu.recording.importing import ColumnMap
     from gfimu.recording.mapped import RecordingLike, RecordingSource
@@ -47,12 +49,93 @@ if TYPE_CHECKING:
 __all__ = ["convert"]
 
 
-def _report(
-    found: "Recording | Calibration | AccelerometerArray", values: "Mapping[str, Any]"
-) -> "Converted | ConvertedArray | ConvertedCalibration":
-    from gfimu.commands.converted import converted
+_COUNTED = ("packets", "bytes", "dropped_rows")
 
-    return converted(found, values)
+
+@dataclass(frozen=True)
+class _Shown(Declared):
+    """Figures that are printed below the name of a file."""
+
+    title: str
+
+    def shown(self) -> Iterator[Table]:
+        """Yield the table that people read."""
+        yield figures(self.title, self)
+
+
+def _of_stream(what: str, unit: str = "") -> Key:
+    return figure(f"Of a MIMU4444 stream: {what}.", unit, head=what, absent=True)
+
+
+def _left_out(why: str) -> Key:
+    return figure(f"Rows left out {why}.", head=f"rows left out {why}", absent=True)
+
+
+@dataclass(frozen=True)
+class Converted(_Shown):
+    """A recording in another format."""
+
+    samples: Annotated[int, figure("Samples.", head="samples")]
+    channels: Annotated[int, figure("Channels.", head="channels")]
+    duration_s: Annotated[float, figure("Length.", "s", head="duration", form=".9g")]
+    sample_rate_hz: Annotated[
+        float | None, figure("Sample rate; null of a single sample.", "Hz", head="sample rate", form=".9g")
+    ]
+    gaps: Annotated[int, figure("Places where samples are lost.", head="gaps")]
+    packets: Annotated[int | None, _of_stream("packets")] = None
+    packets_missing: Annotated[int | None, _of_stream("packets that are lost")] = None
+    packets_corrupt: Annotated[int | None, _of_stream("packets with a wrong checksum")] = None
+    bytes_skipped: Annotated[int | None, _of_stream("bytes between packets", "bytes")] = None
+    dropped_rows_duplicates: Annotated[int | None, _left_out("as duplicates")] = None
+    dropped_rows_unordered: Annotated[int | None, _left_out("as not in order of time")] = None
+    dropped_rows_untimed: Annotated[int | None, _left_out("for a missing time")] = None
+    dropped_rows_corrupt: Annotated[int | None, _left_out("as corrupt")] = None
+    dropped_rows_out_of_range: Annotated[int | None, _left_out("as out of range")] = None
+    dropped_rows_missing: Annotated[int | None, _left_out("for a missing value")] = None
+
+
+@dataclass(frozen=True)
+class ConvertedArray(_Shown):
+    """An array as a MuJoCo model."""
+
+    array: Annotated[str, figure("Name of the array.", head="array")]
+    chips: Annotated[int, figure("Chips.", head="chips")]
+    channels: Annotated[int, figure("Channels.", head="channels")]
+
+
+@dataclass(frozen=True)
+class ConvertedCalibration(_Shown):
+    """A calibration in another format."""
+
+    format: Annotated[str, figure("kalibr or ros.", head="format")]
+    method: Annotated[str, figure("Method that made the calibration.", head="method")]
+    unit: Annotated[str, figure("Unit of the readings that it applies to.", head="unit")]
+    chips: Annotated[int, figure("Chips.", head="chips")]
+
+
+def _report(
+    found: "Recording | Calibration | AccelerometerArray", values: Mapping[str, Any]
+) -> Converted | ConvertedArray | ConvertedCalibration:
+    """Return the figures of what was converted, of the arguments of the command."""
+    from gfimu.array.array import AccelerometerArray
+    from gfimu.calibration.result import Calibration
+
+    target = str(values["target"])
+    if isinstance(found, AccelerometerArray):
+        return ConvertedArray(target, found.name, len(found.chips), found.n_channels)
+    if isinstance(found, Calibration):
+        return ConvertedCalibration(target, values["to"], found.method, found.unit, len(found.chips))
+    several = len(found) > 1
+    counted = {**found.metadata, **{f"dropped_rows_{kind}": count for kind, count in found.dropped.items()}}
+    return Converted(
+        ", ".join(map(str, values["source"])),
+        len(found),
+        len(found.channels),
+        found.duration,
+        found.sample_rate if several else None,
+        len(found.gaps) if several else 0,
+        **{key: counted[key] for key in Converted.keys() & counted.keys() if key.startswith(_COUNTED)},
+    )
 
 
 def _kind_of(target: "str | Path") -> str:
@@ -60,13 +143,16 @@ def _kind_of(target: "str | Path") -> str:
     return {".xml": "model", ".yaml": "calibration", ".yml": "calibration"}.get(Path(target).suffix, "recording")
 
 
-_SOURCE = Option(
+_SOURCE = file_argument(
     "Recording: .csv, .parquet, a MIMU4444 stream, or with --map a foreign file, one per chip; or a calibration "
     "(.json), or an array (a name or .toml).",
     "SOURCE...",
-    kind=list[Path],
-    argument=True,
-    reads=True,
+    list[Path],
+)
+_EXPORT = OutputFile(
+    "what is converted",
+    (".csv", ".parquet", ".mcap", ".euroc", ".yaml", ".yml", ".xml"),
+    {".mcap": ("mcap", "rosbags"), ".xml": ("mujoco",)},
 )
 _TARGET = Option(
     "File to write: .csv, .parquet, .mcap (ROS 2), .euroc (a folder); .yaml of a calibration; .xml of an array, for "
@@ -74,7 +160,7 @@ _TARGET = Option(
     "TARGET",
     argument=True,
     needed=True,
-    writes=EXPORT,
+    writes=_EXPORT,
     what=_kind_of,
 )
 _DROP = Option(
@@ -83,7 +169,7 @@ _DROP = Option(
 _TO = Option(
     "Of a calibration, the format: kalibr or ros. Of an array: turntable, motor_turntable or free_cube.",
     "FORMAT",
-    offers=words("kalibr", "ros", "turntable", "motor_turntable", "free_cube"),
+    offers=("kalibr", "ros", "turntable", "motor_turntable", "free_cube"),
 )
 _COUNT = Option("Of a calibration for counts: m/s² per count, as the sensor's driver has it.")
 _NOISE = Option("Of a calibration: recording at rest, for noise and sample rate.", "FILE", reads=True)
@@ -125,7 +211,7 @@ def convert(
     >>> import gfimu
     >>> gfimu.convert("log.csv", "run.parquet", column_map="phyphox")  # doctest: +SKIP
     """
-    from gfimu.commands.opened import as_array, as_runs
+    from gfimu.calibration.result import Calibration
 
     sources = as_runs(source)  # type: ignore[arg-type]
     alone = sources[0] if len(sources) == 1 else None
@@ -133,16 +219,21 @@ def convert(
     if drawn is not None:
         if (lsb_m_s2, chip, noise) != (None, None, None):
             raise InputError("--lsb-m-s2, --chip and --noise are for a calibration (.json, from gfimu calibrate)")
-        _write_array(drawn, target, to or "turntable")
+        if target is not None and Path(target).suffix != ".xml":
+            raise InputError(f"{target}: an array is written as a MuJoCo model; name it .xml")
+        from sim.rigs.mjcf_export import array_as_mjcf
+
+        text = array_as_mjcf(drawn, to or "turntable")
+        if target is not None:
+            write_text(target, text)
         return drawn
     drawing = None if array is None else as_array(array)
-    calibration = _calibration(alone)
-    if calibration is not None:
-        from gfimu.base.files.atomic_file import write_text
+    if isinstance(alone, Calibration) or (isinstance(alone, str | Path) and Path(alone).suffix == ".json"):
         from gfimu.calibration.exporting import TARGETS, calibrated_chips, notes_of
         from gfimu.commands.noise import noise as recorded_noise
         from gfimu.sensor_noise import RecordingNoise
 
+        calibration = as_calibration(alone)
         if to is None:
             raise InputError(f"a calibration is written for one of {', '.join(TARGETS)}; name it with --to")
         if to not in TARGETS:
@@ -171,7 +262,6 @@ def _read(
     max_memory: "MemorySize | None",
 ) -> "Recording":
     """Return the recording that one source, or a file per chip, holds."""
-    from gfimu.commands.opened import as_source, files_by_map, name_of
     from gfimu.recording.carried_array import carried_array
     from gfimu.recording.checks import examine
     from gfimu.recording.formats import open_recording
@@ -219,22 +309,9 @@ def _write(recording: "Recording", target: Path) -> None:
         recording.write(target)
 
 
-def _write_array(array: "AccelerometerArray", target: "str | Path | None", rig: str) -> None:
-    """Write an array as a MuJoCo model."""
-    from gfimu.base.files.atomic_file import write_text
-    from sim.rigs.mjcf_export import array_as_mjcf
-
-    if target is not None and Path(target).suffix != ".xml":
-        raise InputError(f"{target}: an array is written as a MuJoCo model; name it .xml")
-    text = array_as_mjcf(array, rig)
-    if target is not None:
-        write_text(target, text)
-
-
 def _array(source: object, target: "str | Path | None") -> "AccelerometerArray | None":
     """Return the array that is to be converted: one itself, or what is named where the target is a MuJoCo model."""
     from gfimu.array.array import AccelerometerArray
-    from gfimu.commands.opened import as_array
 
     if isinstance(source, AccelerometerArray):
         return source
@@ -243,12 +320,3 @@ def _array(source: object, target: "str | Path | None") -> "AccelerometerArray |
     if not isinstance(source, str | Path) or Path(source).suffix not in {"", ".toml", ".xml"}:
         raise InputError(f"{target}: a MuJoCo model is made of an array; give its name or .toml file")
     return as_array(source)
-
-
-def _calibration(source: object) -> "Calibration | None":
-    """Return the calibration that is to be converted; None for a recording."""
-    from gfimu.calibration.result import Calibration, load_calibration
-
-    if isinstance(source, str | Path):
-        return load_calibration(source) if Path(source).suffix == ".json" else None
-    return source if isinstance(source, Calibration) else None

@@ -12,10 +12,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from gfimu.base.errors import InputError
+from gfimu.base.files.outputs import OutputFile
 from gfimu.commands import given
 from gfimu.commands.shell import completion, options
 from gfimu.commands.shell.declare import Option, command
-from gfimu.commands.shell.output_files import SCENARIO
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -29,8 +29,9 @@ _EFFECTS = Option(
     "Effects to distinguish; or use --verdict.", "[EFFECT]...", kind=list[str], argument=True, offers=completion.effects
 )
 _VERDICT = Option("Take the effects of an ambiguous verdict (verdict.json).", "FILE", reads=True)
+_EXPERIMENT = OutputFile("a scenario file", (".toml",))
 _RUN = "Recording at hand, to be diagnosed together with the new one; may be repeated."
-_ACCELERATION = Option("Largest angular acceleration of the table, rad/s².", "RAD/S²")
+_OUT = Option("Scenario to write (.toml): the experiment.", "FILE", writes=_EXPERIMENT, what="scenario")
 
 
 @command(doing="designing")
@@ -44,15 +45,12 @@ def design(
     column_map: given.Map = None,
     max_memory: given.Memory = None,
     max_rate: Annotated[float, Option("Largest rate of the table, rad/s.", "RAD/S")] = 15.0,
-    max_acceleration: Annotated[float, _ACCELERATION] = 20.0,
+    max_acceleration: Annotated[float, Option("Largest angular acceleration of the table, rad/s².", "RAD/S²")] = 20.0,
     duration: Annotated[float, options.DURATION] = 60.0,
     upright: Annotated[bool, Option("Never propose to mount the array differently.")] = False,
     evaluations: Annotated[int, Option("How many profiles to try.", "N", least=1)] = 150,
     seed: Annotated[int, options.SEED] = 0,
-    out: Annotated[
-        "str | Path | None",
-        Option("Scenario to write (.toml): the experiment.", "FILE", writes=SCENARIO, what="scenario"),
-    ] = None,
+    out: Annotated["str | Path | None", _OUT] = None,
     progress: given.Progress = None,
 ) -> "Proposal":
     """Propose the table profile, or the mounting, that best separates effects.

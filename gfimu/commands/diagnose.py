@@ -30,6 +30,7 @@ from gfimu.base.errors import InputError
 from gfimu.base.files.outputs import OutputFolder, check_outputs, same_file
 from gfimu.base.optional_packages import missing
 from gfimu.commands import given
+from gfimu.commands.check import check as look
 from gfimu.commands.shell import options
 from gfimu.commands.shell.declare import Option, command, command_of
 
@@ -82,14 +83,12 @@ class _Report:
 
     def _recordings(self) -> list[str]:
         """Return what the recordings show; nothing where the check refuses them, which the diagnosis reports."""
-        from gfimu.commands.check import check
         from gfimu.commands.shell.output import progress
 
-        looked_at = command_of(check)
         with progress("looking at the recordings"), warnings.catch_warnings():
             warnings.simplefilter("ignore")
             try:
-                return list(check(**looked_at.taken(self.values)).in_short())
+                return list(look(**command_of(look).taken(self.values)).in_short())
             except InputError:
                 return []
 
@@ -112,7 +111,6 @@ def _run(
     *,
     check: Annotated[bool, Option("Only look at the recordings, as `gfimu check`: no diagnosis, no --out.")] = False,
 ) -> None:
-    from gfimu.commands.check import check as look
     from gfimu.commands.shell.printing import print_report
 
     if not check and values["out"] is None:
@@ -309,15 +307,13 @@ def _written_files(diagnosis: "Diagnosis", folder: str | Path) -> dict[str, Path
 
 def _twin_files(diagnosis: "Diagnosis") -> dict[str, str]:
     """Return the texts of array file and twin file where the array is no shipped one, and moves with the twin."""
-    import tomli_w
-
     from gfimu.base.files.model_files import list_models
     from sim.twin import Twin
 
     twin = diagnosis.twin
     if not isinstance(twin, Twin) or twin.array_name in list_models("arrays"):
         return {}
-    return {"twin.toml": tomli_w.dumps({**twin.to_dict(), "array": "array.toml"}), "array.toml": twin.array.to_toml()}
+    return {"twin.toml": replace(twin, array_name="array.toml").to_toml(), "array.toml": twin.array.to_toml()}
 
 
 def drawn_rig(diagnosis: "Diagnosis") -> "DrawnRig | None":

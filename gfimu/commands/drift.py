@@ -15,15 +15,14 @@ import math
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Annotated, Any
 
-from gfimu.base.errors import InputError
+from gfimu.base.errors import InputError, naming
 from gfimu.commands import given
 from gfimu.commands.known_axis import AXIS_ALONE, AxisLike, KnownAxis, as_known_axis
-from gfimu.commands.opened import as_array
+from gfimu.commands.opened import as_array, as_calibrated_run, as_source, name_of
 from gfimu.commands.shell import options
-from gfimu.commands.shell.declare import Command, Option, command, command_of
+from gfimu.commands.shell.declare import Option, command, command_of
 
 if TYPE_CHECKING:
-    from gfimu.budget.drift import ErrorSources
     from gfimu.budget.drift.equivalent import EquivalentErrors
     from gfimu.budget.drift.rest_windows import RestDrift
     from gfimu.budget.drift.result import Drift
@@ -31,6 +30,7 @@ if TYPE_CHECKING:
 
 __all__ = ["axis_drift", "drift", "drift_from_position", "drift_of_rest"]
 
+_RECORDING = given.RUN.also(" with long rests: the drift that it has, beside what its noise predicts.", metavar="[RUN]")
 _USUAL = "cube12"
 _ARRAY = options.ARRAY.also(f"; else the recording's own, or {_USUAL} without a recording")
 _TIME = options.DURATION.also(", from the start of navigation")
@@ -40,9 +40,6 @@ _LEAD = Option("With RUN: rest before each window, from which tilt and biases ar
 _POSITION = Option("Measured position error x y z after --duration, m, z up: which bias or drift would explain it?")
 _KNOWN_BIAS = Option("With --from-position: known bias of p, x y z, mg; its share is taken off first.")
 _LATITUDE = options.LATITUDE.also(", for the Earth's share", when="With --from-position: ")
-_HUB_NOISE = Option("Of a free hub: density of its own force, m/s²/√Hz.")
-_RATE_DRIFT = Option("Constant error of the angular rate per axis, °/h.")
-_OFFSET = Option("Horizontal place of the unit off the axis, x y, m.")
 _OF_RECORDINGS = {"lead", "calibration", "picture", "column_map", "force"}
 _OF_POSITIONS = {"known_bias_mg", "latitude"}
 _OF_FREE_BODIES = {"rate_drift_deg_h", "offset", "monte_carlo"}
@@ -50,10 +47,7 @@ _OF_FREE_BODIES = {"rate_drift_deg_h", "offset", "monte_carlo"}
 
 @command(doing="navigating through the rests")
 def drift_of_rest(
-    recording: Annotated[
-        given.Run,
-        given.RUN.also(" with long rests: the drift that it has, beside what its noise predicts.", metavar="[RUN]"),
-    ],
+    recording: Annotated[given.Run, _RECORDING],
     array: Annotated[given.Array, _ARRAY] = None,
     *,
     duration: Annotated[float, _TIME] = 30.0,
@@ -82,9 +76,7 @@ def drift_of_rest(
     >>> len(found.start_s) > 1
     True
     """
-    from gfimu.base.errors import naming
     from gfimu.budget.drift.rest_windows import rest_drift
-    from gfimu.commands.opened import as_calibrated_run, as_source, name_of
     from gfimu.recording.checks import examine
 
     source = as_source(recording, array, column_map, max_memory=max_memory)
@@ -135,7 +127,7 @@ def axis_drift(
     noise_ug: Annotated[float, options.NOISE_UG] = 0.0,
     walk_ug: Annotated[float, _WALK] = 0.0,
     speed_rad_s: Annotated[float, _SPEED] = 0.0,
-    hub_noise_m_s2_rthz: Annotated[float, _HUB_NOISE] = 0.1,
+    hub_noise_m_s2_rthz: Annotated[float, Option("Of a free hub: density of its own force, m/s²/√Hz.")] = 0.1,
 ) -> "AxisDrift":
     """Budget the drift of rate and angle about a known axis, for as few as one chip.
 
@@ -158,55 +150,41 @@ def axis_drift(
     turning = as_known_axis(axis).of(geometry) or geometry.turning_axis
     if turning is None:
         raise InputError(f"array {geometry.name!r} has no axis of its own; give one, such as axis='z' (--axis z)")
-    return drift_about(
-        geometry,
-        turning,
-        duration,
-        bias=sources.bias,
-        noise_density=sources.noise_density,
-        bias_random_walk=sources.bias_random_walk,
-        rate_rad_s=speed_rad_s,
-        hub_density=hub_noise_m_s2_rthz,
-    )
+    return drift_about(geometry, turning, duration, rate_rad_s=speed_rad_s, hub_density=hub_noise_m_s2_rthz, **sources)
 
 
 def _run(values: Mapping[str, Any], as_json: bool) -> None:
-    """Call the function that the options are of, and print what it gives."""
+    """Call the function that the options are of, and print what it gives; refuse an option that is of another one."""
     from gfimu.commands.shell.printing import print_report
 
-    declared = _meant(values)
-    own = {name: values[name] for name in declared.parameters if values.get(name) is not None}
-    print_report(declared, own, as_json=as_json)
-
-
-def _meant(values: Mapping[str, Any]) -> Command:
-    """Return what the options are of; raises `InputError` for one that is of something else."""
     functions = tuple(command_of(function) for function in (drift, drift_of_rest, drift_from_position, axis_drift))
     of_body, of_rest, of_position, of_axis = functions
     usual = {name: parameter.default for one in functions for name, parameter in one.parameters.items()}
     used = {name for name, default in usual.items() if values.get(name) not in (default, None, KnownAxis())}
     if values["recording"] is not None:
-        if used - of_rest.parameters.keys():
+        meant = of_rest
+        if used - meant.parameters.keys():
             raise InputError(
                 f"{values['recording']}: the drift of a recording goes with --array, --calibration, --duration, "
                 "--lead, --gravity, --picture, --map and --force; its noise is measured"
             )
-        return of_rest
-    if used & _OF_RECORDINGS:
+    elif used & _OF_RECORDINGS:
         raise InputError("--lead, --calibration, --picture, --map and --force are of a recording; name it first")
-    if values["from_position"] is not None:
-        if used - of_position.parameters.keys():
+    elif values["from_position"] is not None:
+        meant = of_position
+        if used - meant.parameters.keys():
             raise InputError(
                 "--from-position works errors out; give it with --duration, --known-bias-mg, --latitude, --gravity"
             )
-        return of_position
-    if used & _OF_POSITIONS:
+    elif used & _OF_POSITIONS:
         raise InputError("--known-bias-mg and --latitude go with --from-position")
-    if values["axis"].of(as_array(values["array"] or _USUAL)) is None:
-        return of_body
-    if used & _OF_FREE_BODIES:
-        raise InputError("--rate-drift-deg-h, --offset and --monte-carlo have no use with a known axis (--axis)")
-    return of_axis
+    elif values["axis"].of(as_array(values["array"] or _USUAL)) is None:
+        meant = of_body
+    else:
+        meant = of_axis
+        if used & _OF_FREE_BODIES:
+            raise InputError("--rate-drift-deg-h, --offset and --monte-carlo have no use with a known axis (--axis)")
+    print_report(meant, meant.taken(values), as_json=as_json)
 
 
 @command(doing="Monte Carlo", run=_run, parts=(drift_of_rest, drift_from_position, axis_drift))
@@ -217,9 +195,9 @@ def drift(
     bias_mg: Annotated[float, options.BIAS_MG] = 0.0,
     noise_ug: Annotated[float, options.NOISE_UG] = 0.0,
     walk_ug: Annotated[float, _WALK] = 0.0,
-    rate_drift_deg_h: Annotated[float, _RATE_DRIFT] = 0.0,
+    rate_drift_deg_h: Annotated[float, Option("Constant error of the angular rate per axis, °/h.")] = 0.0,
     speed_rad_s: Annotated[float, _SPEED] = 0.0,
-    offset: Annotated[tuple[float, float], _OFFSET] = (0.0, 0.0),
+    offset: Annotated[tuple[float, float], Option("Horizontal place of the unit off the axis, x y, m.")] = (0.0, 0.0),
     gravity: Annotated[float, options.GRAVITY] = 9.80665,
     monte_carlo: Annotated[int, Option("Number of nonlinear Monte Carlo runs; 0 for none.")] = 0,
     seed: Annotated[int, options.SEED] = 0,
@@ -243,13 +221,13 @@ def drift(
     """
     import numpy as np
 
-    from gfimu.budget.drift import drift_budget
+    from gfimu.budget.drift import ErrorSources, drift_budget
     from gfimu.budget.drift.monte_carlo import monte_carlo_drift
     from gfimu.budget.drift.result import Drift
 
     if monte_carlo == 1 or monte_carlo < 0:
         raise InputError(f"--monte-carlo {monte_carlo}: give 0 for none, or 2 or more runs")
-    sources = _sources(bias_mg, noise_ug, walk_ug, rate_drift_deg_h)
+    sources = ErrorSources(**_sources(bias_mg, noise_ug, walk_ug, rate_drift_deg_h))
     geometry = as_array(array or _USUAL)
     motion: dict[str, Any] = {"rate": speed_rad_s, "offset": offset, "gravity": gravity}
     budget = drift_budget(geometry, duration, sources, **motion)
@@ -260,19 +238,18 @@ def drift(
     return Drift(budget, sample, seed)
 
 
-def _sources(bias_mg: float, noise_ug: float, walk_ug: float, rate_drift_deg_h: float = 0.0) -> "ErrorSources":
-    """Return the errors in SI units; raises `InputError` if there is none."""
+def _sources(bias_mg: float, noise_ug: float, walk_ug: float, rate_drift_deg_h: float = 0.0) -> dict[str, float]:
+    """Return the errors in SI units, without those that are zero; raises `InputError` if there is none."""
     from gfimu.base.units import STANDARD_GRAVITY
-    from gfimu.budget.drift import ErrorSources
 
-    sources = ErrorSources(
-        bias=bias_mg * 1e-3 * STANDARD_GRAVITY,
-        noise_density=noise_ug * 1e-6 * STANDARD_GRAVITY,
-        bias_random_walk=walk_ug * 1e-6 * STANDARD_GRAVITY,
-        rate_drift=math.radians(rate_drift_deg_h / 3600.0),
-    )
-    if not any(vars(sources).values()):
+    sources = {
+        "bias": bias_mg * 1e-3 * STANDARD_GRAVITY,
+        "noise_density": noise_ug * 1e-6 * STANDARD_GRAVITY,
+        "bias_random_walk": walk_ug * 1e-6 * STANDARD_GRAVITY,
+        "rate_drift": math.radians(rate_drift_deg_h / 3600.0),
+    }
+    if not any(sources.values()):
         raise InputError(
             "no error to budget: give at least one of --bias-mg, --noise-ug, --walk-ug, --rate-drift-deg-h"
         )
-    return sources
+    return {name: size for name, size in sources.items() if size}

@@ -15,16 +15,13 @@ gfimu estimate run.csv --array arm.toml --axis z --lever-std-m 0.003 --rotation-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 from gfimu.base.errors import InputError, naming
 from gfimu.commands import given
 from gfimu.commands.known_axis import AXIS, AxisLike, as_known_axis
-from gfimu.commands.place import PLACE, Place
 from gfimu.commands.shell import options
-from gfimu.commands.shell.completion import words
-from gfimu.commands.shell.declare import Option, command
-from gfimu.commands.shell.output_files import ESTIMATE
+from gfimu.commands.shell.declare import Group, Option, command
 from gfimu.rate.registry import RATE_METHODS, rate_method
 
 if TYPE_CHECKING:
@@ -35,12 +32,11 @@ if TYPE_CHECKING:
     from gfimu.motion.estimate_summary import EstimateSummary
     from gfimu.recording import Recording
 
-__all__ = ["estimate"]
+__all__ = ["Place", "estimate"]
 
 _FILTERED = " (filter, smoother)"
-_OUT = Option("Estimate to write (.csv, .parquet)", writes=ESTIMATE, what="estimate", needed=True)
-_METHOD = Option(f"Angular rate by: {', '.join(RATE_METHODS)}.", "METHOD", offers=words(*RATE_METHODS))
-_FORMS = words("auto", "linear", "joint", "recursive")
+_METHOD = Option(f"Angular rate by: {', '.join(RATE_METHODS)}.", "METHOD", offers=tuple(RATE_METHODS))
+_FORMS = ("auto", "linear", "joint", "recursive")
 _FORM = Option("How readings turn into p and α: auto, linear, joint or recursive.", "FORM", offers=_FORMS)
 _OMEGA = Option("Angular rate at the first sample (3,), body axes, rad/s; at rest by default.", shell=False)
 _QUATERNION = Option(
@@ -52,26 +48,64 @@ _NOISE = Option(
     "Standard deviation of one sample of each channel, scalar or (c,), m/s²; by default from the parts' data sheets.",
     shell=False,
 )
-_PROGRESS = Option("Called with the share done, 0 to 1.", shell=False)
+
+
+_LATITUDE = options.LATITUDE.also(": the Earth's rotation and the local gravity from it")
+_NORTH = Option("With --latitude: north from the x-axis at the start, about up, rad; else 0.", "RAD")
 
 
 @dataclass(frozen=True)
-class _EstimatedRun:
-    """An estimate with the recording and the array that it was made from, calibrated where that was asked for."""
+class Place:
+    """A place on the Earth; what is None is the recording's own.
 
-    estimate: "Estimate"
-    recording: "Recording"
-    array: "AccelerometerArray"
+    Parameters
+    ----------
+    latitude : float, optional
+        Latitude, degrees (metadata ``latitude_deg``).
+    north_rad : float, optional
+        Direction of north from the world's x-axis (for a levelled body: from its own at the start), about up, rad
+        (metadata ``north_rad``, or 0).
+
+    Examples
+    --------
+    >>> import gfimu
+    >>> gfimu.estimate("run.parquet", place=gfimu.Place(52.0, north_rad=0.5))  # doctest: +SKIP
+    """
+
+    latitude: Annotated[float | None, _LATITUDE] = None
+    north_rad: Annotated[float | None, _NORTH] = None
+
+    def of(self, recording: "Recording") -> dict[str, Any]:
+        """Return the Earth's rotation and the gravity there as options of the estimate; none without a place.
+
+        Raises
+        ------
+        InputError
+            If north is known and the latitude is not.
+        """
+        from gfimu.motion.place import place_options
+
+        return place_options(recording, self.latitude, self.north_rad)
 
 
-def _summary(run: _EstimatedRun, _: Mapping[str, Any]) -> "EstimateSummary":
+_PLACE = Group(
+    Place,
+    "Where on the Earth the body is, such as ``gfimu.Place(52.0, north_rad=0.5)``: the Earth's rotation and the local "
+    "gravity from it are taken into account. By default the recording's own place, or none.",
+)
+
+_EstimatedRun: TypeAlias = "tuple[Estimate, Recording, AccelerometerArray]"
+"""An estimate with the recording and the array that it was made from, calibrated where that was asked for."""
+
+
+def _summary(estimated: _EstimatedRun, _: Mapping[str, Any]) -> "EstimateSummary":
     from gfimu.motion.estimate_summary import summarise
 
-    return summarise(run.estimate, run.recording, run.array)
+    return summarise(*estimated)
 
 
-def _estimate_of(run: _EstimatedRun) -> "Estimate":
-    return run.estimate
+def _estimate_of(estimated: _EstimatedRun) -> "Estimate":
+    return estimated[0]
 
 
 def _doing(given: Mapping[str, Any]) -> str:
@@ -93,7 +127,7 @@ def estimate(
     recording: Annotated[given.Run, given.RUN.also(": .csv, .parquet, or a MIMU4444 stream (.bin, .bin.gz).")],
     array: given.Array = None,
     *,
-    out: Annotated["str | Path | None", _OUT] = None,
+    out: Annotated["str | Path | None", options.ESTIMATE_OUT.also(what="estimate", needed=True)] = None,
     method: Annotated[str, _METHOD] = "integrate",
     form: Annotated[str, _FORM] = "auto",
     rest_bias: Annotated[bool, Option("Read the biases off the first rest (table level) and take them off.")] = False,
@@ -101,7 +135,7 @@ def estimate(
     unknown_start: Annotated[bool, options.UNKNOWN_START.also(_FILTERED)] = False,
     gyro: Annotated[bool, options.GYRO.also(_FILTERED)] = False,
     position: Annotated[bool, Option("Integrate to velocity and position too.")] = False,
-    place: Annotated[Place, PLACE] = Place(),
+    place: Annotated[Place, _PLACE] = Place(),
     force: Annotated[bool, options.FORCE] = False,
     keep_faulty: Annotated[bool, options.KEEP_FAULTY.also(_FILTERED)] = False,
     rrd: Annotated["str | Path | None", options.RRD] = None,
@@ -111,7 +145,7 @@ def estimate(
     omega0: Annotated["ArrayLike", _OMEGA] = (0.0, 0.0, 0.0),
     quaternion0: Annotated["ArrayLike | None", _QUATERNION] = None,
     noise_std: Annotated["ArrayLike | None", _NOISE] = None,
-    progress: Annotated[Callable[[float], object] | None, _PROGRESS] = None,
+    progress: Annotated[Callable[[float], object] | None, options.SHARE] = None,
 ) -> _EstimatedRun:
     """Estimate p, α, ω, attitude and table angle at every sample of a recording.
 
@@ -200,4 +234,4 @@ def estimate(
         axis_found = result.metadata.get("turning_axis")
         turning = None if axis_found is None else TurningAxis.from_dict(axis_found, source=geometry.name)
         write_run(rrd, run, replace(geometry, turning_axis=turning or geometry.turning_axis), estimate=result)
-    return _EstimatedRun(result, run, geometry)
+    return result, run, geometry

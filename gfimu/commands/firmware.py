@@ -13,23 +13,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypedDict, Unpack, overload
 
 from gfimu.base.errors import InputError
-from gfimu.base.files.outputs import RECORDING, OutputFolder
+from gfimu.base.files.outputs import RECORDING, OutputFile, OutputFolder
 from gfimu.base.optional_packages import require
+from gfimu.commands.shell import options
 from gfimu.commands.shell.declare import Group, Option, command
-from gfimu.commands.shell.options import (
-    BAUD,
-    CHIPS,
-    DURATION,
-    IMAGE,
-    PORT,
-    RANGE,
-    RATE,
-    SCENARIO,
-    SEED,
-    SHARE,
-    TIME_LIMIT,
-)
-from gfimu.commands.shell.output_files import TRACE
 
 if TYPE_CHECKING:
     from firmware_bridge.board.trace import TraceCounts
@@ -47,24 +34,18 @@ _EITHER = "give either --port (pty or tcp:PORT) or --out (a recording)"
 IMAGES = OutputFolder(("gfimu.elf", "gfimu.bin", "gfimu.toml", "selfcheck.elf", "selfcheck.bin", "selfcheck.toml"))
 """What a folder of built images may hold."""
 
-_RIDDEN = SCENARIO.also(", whose motion the board rides")
-_ASKED_RATE = RATE.also(", asked of the firmware, 10 to 3200")
-_NAMED_IMAGE = IMAGE.also(argument=True, metavar="[IMAGE]")
-_VIRTUAL = DURATION.also(", of virtual time", least=0.0)
-_PORT = PORT.also(" to open: pty, or tcp:PORT (0: any free one)")
+_RIDDEN = options.SCENARIO.also(", whose motion the board rides")
+_ASKED_RATE = options.RATE.also(", asked of the firmware, 10 to 3200")
+_NAMED_IMAGE = options.IMAGE.also(argument=True, metavar="[IMAGE]")
+_VIRTUAL = options.DURATION.also(", of virtual time", least=0.0)
 _OUT = Option("Without a port: recording to write (.csv, .parquet).", "FILE", writes=RECORDING, what="recording")
-_RUN_TIME = _VIRTUAL.also("; else the scenario's, with a port without end")
-_ASKED_RANGE = RANGE.also(", asked of the firmware", name="--range")
 _REALTIME = Option("With a port: keep pace with the clock on the wall.", name="--realtime/--no-realtime")
-_PURE_PYTHON = Option("Run all peripherals in Python: slower, the same result.")
 _SHARE = Option("Without a port: called with the share done, 0 to 1.", shell=False)
 _ON_OPEN = Option("With a port: called with its name when the board answers there.", shell=False)
 _FOLDER = Option("Folder to write: the image; else the package's own folder.", "FOLDER", writes=IMAGES)
 _ON_BOARD = Option("Name of the array on the board, which the board then states to the host.", "NAME", reads=True)
-_TRACE = Option("Trace to write (.vcd for GTKWave, .rrd for rerun).", "FILE", writes=TRACE, what="trace")
-_SKIP = Option("Virtual time before the trace, s.", "S", least=0.0)
-_ATTACHED = CHIPS.also(": ADXL345s on SSP1, 0 to 4; their chip-selects are P2.0 and so on")
-_LINE_SPEED = BAUD.also(", that the UARTs are meant to send at; else any usual one")
+_VCD_OR_RRD = OutputFile("a trace", (".vcd", ".rrd"), {".rrd": ("rerun",)})
+_TRACE = Option("Trace to write (.vcd for GTKWave, .rrd for rerun).", "FILE", writes=_VCD_OR_RRD, what="trace")
 
 
 def _run_on_shell(given: Mapping[str, Any], as_json: bool) -> None:
@@ -116,15 +97,15 @@ def run(
 def run(
     *,
     scenario: Annotated[str | Path, _RIDDEN] = "paper_run",
-    port: Annotated[str | None, _PORT] = None,
+    port: Annotated[str | None, options.PORT.also(" to open: pty, or tcp:PORT (0: any free one)")] = None,
     out: Annotated[str | Path | None, _OUT] = None,
-    duration: Annotated[float | None, _RUN_TIME] = None,
+    duration: Annotated[float | None, _VIRTUAL.also("; else the scenario's, with a port without end")] = None,
     rate: Annotated[int, _ASKED_RATE] = 100,
-    range_g: Annotated[int, _ASKED_RANGE] = 16,
+    range_g: Annotated[int, options.RANGE.also(", asked of the firmware", name="--range")] = 16,
     realtime: Annotated[bool, _REALTIME] = True,
-    seed: Annotated[int, SEED] = 0,
-    image: Annotated[str | Path, IMAGE] = "gfimu",
-    pure_python: Annotated[bool, _PURE_PYTHON] = False,
+    seed: Annotated[int, options.SEED] = 0,
+    image: Annotated[str | Path, options.IMAGE] = "gfimu",
+    pure_python: Annotated[bool, Option("Run all peripherals in Python: slower, the same result.")] = False,
     progress: Annotated[Callable[[float], None] | None, _SHARE] = None,
     on_open: Annotated[Callable[[str], None] | None, _ON_OPEN] = None,
 ) -> "VirtualRun | ServeReport":
@@ -184,7 +165,7 @@ def build(
     *,
     out: Annotated[str | Path | None, _FOLDER] = None,
     array: Annotated[str, _ON_BOARD] = "",
-    baud: Annotated[int | None, BAUD.also(", after power-on; else 115200")] = None,
+    baud: Annotated[int | None, options.BAUD.also(", after power-on; else 115200")] = None,
     define: Annotated[Mapping[str, str] | None, Group(_definitions, "Preprocessor definitions.")] = None,
 ) -> "BuildReport":
     """Compile the firmware from its C sources with the compiler of the ziglang package.
@@ -233,10 +214,10 @@ def trace(
     *,
     scenario: Annotated[str | Path, _RIDDEN] = "rest",
     duration: Annotated[float, _VIRTUAL] = 0.05,
-    skip: Annotated[float, _SKIP] = 0.0,
+    skip: Annotated[float, Option("Virtual time before the trace, s.", "S", least=0.0)] = 0.0,
     rate: Annotated[int, _ASKED_RATE] = 800,
-    seed: Annotated[int, SEED] = 0,
-    image: Annotated[str | Path, IMAGE] = "gfimu",
+    seed: Annotated[int, options.SEED] = 0,
+    image: Annotated[str | Path, options.IMAGE] = "gfimu",
 ) -> "TraceCounts":
     """Trace register accesses and interrupts of the firmware.
 
@@ -262,7 +243,7 @@ def trace(
 
 @command("firmware faults", doing="faults", exit_code=lambda report: int(not report.passed))
 def faults(
-    *, seed: Annotated[int, SEED] = 0, progress: Annotated[Callable[[float], None] | None, SHARE] = None
+    *, seed: Annotated[int, options.SEED] = 0, progress: Annotated[Callable[[float], None] | None, options.SHARE] = None
 ) -> "FaultReport":
     """Break the wire, the supply and the chips, one after another, and show what the host makes of it.
 
@@ -286,9 +267,9 @@ def check(
     image: Annotated[str | Path, _NAMED_IMAGE] = "gfimu",
     *,
     duration: Annotated[float, _VIRTUAL] = 3.0,
-    chips: Annotated[int, _ATTACHED] = 4,
-    baud: Annotated[int | None, _LINE_SPEED] = None,
-    time_limit: Annotated[float, TIME_LIMIT.also(least=0.0)] = 60.0,
+    chips: Annotated[int, options.CHIPS.also(": ADXL345s on SSP1, 0 to 4; their chip-selects are P2.0 and so on")] = 4,
+    baud: Annotated[int | None, options.BAUD.also(", that the UARTs are meant to send at; else any usual one")] = None,
+    time_limit: Annotated[float, options.TIME_LIMIT.also(least=0.0)] = 60.0,
 ) -> "CheckReport":
     """Run an image on a board that reports what a real LPC1768 would not forgive.
 

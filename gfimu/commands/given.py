@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, TypeAlias
 
 from gfimu.commands.shell import options
-from gfimu.commands.shell.declare import Option
 
 if TYPE_CHECKING:
     from gfimu.array.array import AccelerometerArray
@@ -20,12 +19,11 @@ if TYPE_CHECKING:
 
 __all__ = ["Array", "CalibrationToApply", "Map", "Memory", "Picture", "Progress", "ReferenceMap", "Run", "Runs", "Twin"]
 
-RUN = Option("Recording", "RUN", kind=Path, argument=True, reads=True)
+RUN = options.file_argument("Recording", "RUN")
 """A recording that a command reads; what it has to hold is said by `Option.also`."""
 
-_OWN_ARRAY = options.ARRAY.also("; else the recording's own")
 
-Array: TypeAlias = Annotated["AccelerometerArray | str | Path | None", _OWN_ARRAY]
+Array: TypeAlias = Annotated["AccelerometerArray | str | Path | None", options.ARRAY.also("; else the recording's own")]
 CalibrationToApply: TypeAlias = Annotated["Calibration | str | Path | None", options.CALIBRATION]
 Map: TypeAlias = Annotated["ColumnMap | str | Path | None", options.MAP]
 Memory: TypeAlias = Annotated["MemorySize | None", options.MAX_MEMORY]

@@ -9,11 +9,9 @@ gfimu impact drop.csv --array nap.toml --cfc 180 --out drop_cfc180.csv --estimat
 
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from gfimu.base.files.outputs import RECORDING
 from gfimu.commands import given
 from gfimu.commands.shell.declare import Option, command
-from gfimu.commands.shell.options import FORCE
-from gfimu.commands.shell.output_files import ESTIMATE
+from gfimu.commands.shell.options import ESTIMATE_OUT, FORCE, RECORDING_OUT
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -22,30 +20,24 @@ if TYPE_CHECKING:
 
 __all__ = ["impact"]
 
-_FILTERED = "Recording to write (.csv, .parquet): channels zeroed and filtered, from time zero."
+_RECORDING = given.RUN.also(" with the impact, the largest in it: .csv, .parquet; another with --map.")
+_DIRECTION = Option("Where the body is accelerated (+x, -x, …): the polarity is checked.")
 
 
 @command(doing="measuring the impact")
 def impact(
-    recording: Annotated[
-        given.Run, given.RUN.also(" with the impact, the largest in it: .csv, .parquet; another with --map.")
-    ],
+    recording: Annotated[given.Run, _RECORDING],
     array: given.Array = None,
     *,
     cfc: Annotated[float, Option("Channel frequency class: 1000 (head), 600, 180, 60, or another.")] = 1000.0,
     standard: Annotated[Literal["sae", "iso"], Option("Of the filter: sae (J211-1) or iso (6487).", "NAME")] = "sae",
     threshold_g: Annotated[float, Option("Change of a channel that counts, g.")] = 5.0,
-    direction: Annotated[
-        Literal["+x", "-x", "+y", "-y", "+z", "-z"] | None,
-        Option("Where the body is accelerated (+x, -x, …): the polarity is checked."),
-    ] = None,
+    direction: Annotated[Literal["+x", "-x", "+y", "-y", "+z", "-z"] | None, _DIRECTION] = None,
     calibration: given.CalibrationToApply = None,
     column_map: given.Map = None,
     max_memory: given.Memory = None,
-    out: Annotated["str | Path | None", Option(_FILTERED, writes=RECORDING, what="recording")] = None,
-    estimate: Annotated[
-        "str | Path | None", Option("Estimate to write (.csv, .parquet): p, α, ω from time zero.", writes=ESTIMATE)
-    ] = None,
+    out: Annotated["str | Path | None", RECORDING_OUT.also(": channels zeroed and filtered, from time zero")] = None,
+    estimate: Annotated["str | Path | None", ESTIMATE_OUT.also(": p, α, ω from time zero")] = None,
     picture: given.Picture = None,
     force: Annotated[bool, FORCE] = False,
 ) -> "Impact":

@@ -9,16 +9,15 @@ gfimu convert log.csv run.parquet --map log_map.toml
 """
 
 import os
-from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, cast
+from typing import TYPE_CHECKING, Annotated, cast
 
 from gfimu.base.errors import InputError
+from gfimu.base.files.outputs import OutputFile
 from gfimu.commands import given
 from gfimu.commands.shell.declare import Option, command
-from gfimu.commands.shell.options import TABLE
-from gfimu.commands.shell.output_files import COLUMN_MAP
+from gfimu.commands.shell.options import TABLE, file_argument
 
 if TYPE_CHECKING:
     from gfimu.recording.importing import Inspection
@@ -26,33 +25,17 @@ if TYPE_CHECKING:
 
 __all__ = ["inspect"]
 
-_MOST_COLUMNS = 40
-_FILE = Option(
-    "Text, gzipped or zipped, JSON, Parquet, Excel, MATLAB, HDF5, ULog, MCAP, ROS bag.",
-    "FILE",
-    kind=Path,
-    argument=True,
-    reads=True,
-)
+_COLUMN_MAP = OutputFile("a column map", (".toml",))
+_FILE = file_argument("Text, gzipped or zipped, JSON, Parquet, Excel, MATLAB, HDF5, ULog, MCAP, ROS bag.", "FILE")
+_OUT = Option("Column map to write (.toml), to edit and give as --map.", "FILE", writes=_COLUMN_MAP, what="map")
 
 
-def _results() -> tuple[type, ...]:
-    from gfimu.recording.importing import Inspection
-
-    return (Inspection,)
-
-
-@command(
-    results=_results, report=lambda found, values: _Report(found, values["out"] is None), doing="looking at the file"
-)
+@command(report=lambda found, values: replace(found, shows_map=values["out"] is None), doing="looking at the file")
 def inspect(
     file: Annotated[given.Run, _FILE],
     *,
     table: Annotated[str, TABLE.also(" By default the one with the most accelerations.")] = "",
-    out: Annotated[
-        "str | Path | None",
-        Option("Column map to write (.toml), to edit and give as --map.", "FILE", writes=COLUMN_MAP, what="map"),
-    ] = None,
+    out: Annotated["str | Path | None", _OUT] = None,
     max_memory: given.Memory = None,
 ) -> "Inspection":
     """Analyse a file of unknown layout: columns, units, rate, gaps, rails, corrupt values, chips, a map to start from.
@@ -99,41 +82,3 @@ def inspect(
             raise InputError(f"{found.source}: no three columns that look like accelerations; no map was written")
         write_text(out, found.map_toml)
     return found
-
-
-@dataclass(frozen=True)
-class _Report:
-    """What is printed: the inspection, and its map where that is not written to a file."""
-
-    found: "Inspection"
-    shows_map: bool
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the inspection as JSON holds it."""
-        return self.found.to_dict()
-
-    def shown(self) -> Iterator[Any]:
-        """Yield the columns, the evidence for the map, and the map."""
-        from gfimu.base.declared import FileText, Line, table
-
-        found = self.found
-        if len(found.tables) > 1:
-            yield f"Tables: {'; '.join(found.tables)}. Shown: {found.table or 'the file'}."
-        more = len(found.columns) - _MOST_COLUMNS
-        yield table(
-            found.summary,
-            found.columns[:_MOST_COLUMNS],
-            "name role least median most missing",
-            left=2,
-            note=f"and {more} further columns" if more > 0 else "",
-        )
-        yield from (f"- {line}" for line in found.reasons)
-        if found.findings:
-            yield Line("Odd:", style="bold")
-            yield from (f"- {line}" for line in found.findings)
-        if found.fitting:
-            maps = ", ".join(f"--map {name}" for name in found.fitting)
-            yield Line(f"Maps that come with gfimu and fit: {maps}", style="bold")
-        if self.shows_map and found.column_map is not None:
-            yield Line("A column map to start from (--out FILE.toml writes it):", style="bold")
-            yield FileText(f"{found.map_toml}\n")

@@ -14,16 +14,15 @@ from typing import TYPE_CHECKING, Annotated
 
 from gfimu.commands import given
 from gfimu.commands.shell.declare import Option, command
-from gfimu.commands.shell.options import FORCE, RECORDING_OUT
+from gfimu.commands.shell.options import FORCE, RECORDING_OUT, file_argument
 
 if TYPE_CHECKING:
     from gfimu.recording.joining import Joined, ReferenceSeries
 
 __all__ = ["join"]
 
-_REFERENCE = Option(
-    "File of the tachometer, encoder, command or gyro.", "REFERENCE", argument=True, reads=True, kind=Path
-)
+_REFERENCE = file_argument("File of the tachometer, encoder, command or gyro.", "REFERENCE")
+_RATE_ERROR = Option("Largest rate error between the clocks that is searched, a ratio.")
 
 
 @command(doing="searching the offset between the clocks")
@@ -36,9 +35,7 @@ def join(
     column_map: given.Map = None,
     reference_map: given.ReferenceMap = None,
     max_memory: given.Memory = None,
-    most_rate_error: Annotated[
-        float, Option("Largest rate error between the clocks that is searched, a ratio.")
-    ] = 0.02,
+    most_rate_error: Annotated[float, _RATE_ERROR] = 0.02,
     force: Annotated[bool, FORCE.also(", or the two don't seem to belong together")] = False,
 ) -> "Joined":
     """Find offset and rate error between two clocks, and write channels and reference into one recording.

@@ -74,7 +74,6 @@ _INCLINATION = Option(
     "Angle between the axis and the vertical, rad; else from the data, or 0 (a free hub: π/2) where there are none.",
     "RAD",
 )
-_DIRECTION = Option("With --axis: how exactly its direction is known, rad.", "RAD")
 _ROTATION = Option("With --axis: how exactly each chip's orientation is known, rad.", "RAD")
 
 
@@ -84,7 +83,7 @@ def _from_options(
     hub: Annotated[Literal["fixed", "free"], _HUB] = "fixed",
     inclination_rad: Annotated[float | None, _INCLINATION] = None,
     point_std_m: Annotated[float, Option("With --axis: how exactly --axis-point is known, m.", "M")] = 0.0,
-    direction_std_rad: Annotated[float, _DIRECTION] = 0.0,
+    direction_std_rad: Annotated[float, Option("With --axis: how exactly its direction is known, rad.", "RAD")] = 0.0,
     lever_std_m: Annotated[float, Option("With --axis: how exactly each chip's place is known, m.", "M")] = 0.0,
     rotation_std_rad: Annotated[float, _ROTATION] = 0.0,
     bias_std_m_s2: Annotated[float, BIAS_STD_M_S2.also(when="With --axis: ")] = 0.0,

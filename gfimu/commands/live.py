@@ -15,16 +15,13 @@ gfimu live --from socket://pi:4000 --array wheel.toml --axis z --hub free --unkn
 
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from gfimu.base.errors import InputError
+from gfimu.commands import given
 from gfimu.commands.known_axis import AXIS_ALONE, AxisLike, as_known_axis
 from gfimu.commands.shell.declare import Option, command
-from gfimu.commands.shell.options import ARRAY, BIAS_STD_M_S2, FORCE, GYRO, KEEP_FAULTY, MAX_MEMORY, RATE, UNKNOWN_START
-
-if TYPE_CHECKING:
-    from gfimu.array.array import AccelerometerArray
-    from gfimu.base.files.memory import MemorySize
+from gfimu.commands.shell.options import ARRAY, BIAS_STD_M_S2, FORCE, GYRO, KEEP_FAULTY, RATE, UNKNOWN_START
 
 __all__ = ["live"]
 
@@ -33,8 +30,6 @@ _FROM = Option(
     "Where samples come from: - (standard input), a recording, or host:port of a TCP server.", name="--from", kind=str,
     reads=True,
 )  # fmt: skip
-_FOLLOW = Option("With a recording: go on reading while gfimu record writes it.")
-_SCALE_STD = Option("Uncertainty of the scale factors, a ratio (0.01 is 1 %).")
 
 
 def _results() -> tuple[type, ...]:
@@ -44,29 +39,29 @@ def _results() -> tuple[type, ...]:
     return (LiveSample, SkippedLine, HealthEvent)
 
 
-def _print_lines(given: Mapping[str, Any], as_json: bool) -> None:
+def _print_lines(values: Mapping[str, Any], as_json: bool) -> None:
     """Print the lines as they come: each is JSON in any case; with --json an error is one too."""
     from gfimu.commands.shell.stop_signals import write_line
 
     del as_json
-    for line in live(**given):
+    for line in live(**values):
         write_line(line)
 
 
 @command(results=_results, run=_print_lines)
 def live(
-    array: Annotated["AccelerometerArray | str | Path | None", ARRAY.also("; else the stream's own")] = None,
+    array: Annotated[given.Array, ARRAY.also("; else the stream's own")] = None,
     rate: Annotated[float | None, RATE.also(", nominal; else the stream's own")] = None,
     *,
     source: Annotated["str | Path | Iterable[str]", _FROM] = "-",
-    follow: Annotated[bool, _FOLLOW] = False,
-    scale_std: Annotated[float, _SCALE_STD] = 0.0,
+    follow: Annotated[bool, Option("With a recording: go on reading while gfimu record writes it.")] = False,
+    scale_std: Annotated[float, Option("Uncertainty of the scale factors, a ratio (0.01 is 1 %).")] = 0.0,
     bias_std_m_s2: Annotated[float | None, BIAS_STD_M_S2.also("; else the data sheets'")] = None,
     unknown_start: Annotated[bool, UNKNOWN_START] = False,
     gyro: Annotated[bool, GYRO] = False,
     axis: Annotated[AxisLike, AXIS_ALONE] = None,
     keep_faulty: Annotated[bool, KEEP_FAULTY] = False,
-    max_memory: Annotated["MemorySize | None", MAX_MEMORY] = None,
+    max_memory: given.Memory = None,
     force: Annotated[bool, FORCE] = False,
 ) -> Iterator[str]:
     """Estimate the angular rate while samples arrive: CSV lines in, one JSON line per sample out.
@@ -93,10 +88,10 @@ def live(
     >>> for line in gfimu.live("cube12", 100.0, source=lines):  # doctest: +SKIP
     ...     print(line)
     """
-    import numpy as np
-
     from gfimu.commands.opened import as_array
+    from gfimu.rate.health.live.watched_filter import WatchedRateFilter
     from gfimu.rate.kalman import FilterSettings
+    from gfimu.rate.live import LiveRateFilter
     from gfimu.rate.sensing import SensorErrors, calibrated_bias_std
     from gfimu.rate.stream import examined_lines, filter_stream, read_head
     from gfimu.recording.carried_array import carried_array
@@ -123,15 +118,10 @@ def live(
     bias = calibrated_bias_std(metadata, geometry) if bias_std_m_s2 is None else bias_std_m_s2
     biases: dict[str, Any] = {} if bias is None else {"bias_std": bias}
     errors = SensorErrors.from_parts(geometry, rate, scale_std=scale_std, **biases)
-    settings = FilterSettings(start_omega=None) if unknown_start else FilterSettings(start_omega=np.zeros(3))
+    settings = FilterSettings(start_omega=None) if unknown_start else FilterSettings()
     watched = None
     if not keep_faulty:
-        from gfimu.rate.health.live.channel_watch import LiveWatch
-        from gfimu.rate.health.live.watched_filter import WatchedRateFilter
-        from gfimu.rate.live import LiveRateFilter
-
-        live = LiveRateFilter(geometry, errors, 1.0 / rate, settings, gyro=gyro)
         is_sure = scale_std > 0.0 or "calibration" in metadata
-        stated = errors if is_sure else errors.with_part_gains(geometry)
-        watched = WatchedRateFilter(live, LiveWatch(geometry, stated, 1.0 / rate, at_rest=not unknown_start))
+        live = LiveRateFilter(geometry, errors, 1.0 / rate, settings, gyro=gyro)
+        watched = WatchedRateFilter.of(live, errors, calibrated=is_sure, at_rest=not unknown_start)
     return filter_stream(lines, geometry, errors, 1.0 / rate, settings, fuse_gyro=gyro, watched=watched)

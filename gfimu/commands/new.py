@@ -18,11 +18,10 @@ from typing import Annotated, Any
 
 from gfimu.base.declared import Declared, FileText, figure
 from gfimu.base.errors import InputError, unknown_name
-from gfimu.base.files.outputs import OutputFolder
-from gfimu.commands.file_kinds import FILE_KINDS
-from gfimu.commands.shell.completion import words
+from gfimu.base.files.outputs import OutputFile, OutputFolder
+from gfimu.commands.file_kinds import FILE_KINDS, file_schema
 from gfimu.commands.shell.declare import Option, command
-from gfimu.commands.shell.output_files import JSON_SCHEMA, TOML_FILE
+from gfimu.commands.shell.options import SCHEMA_OUT
 
 __all__ = ["SENDER", "TEMPLATES", "new"]
 
@@ -33,13 +32,11 @@ SENDER = "sender"
 """The folder that can be begun: C files with which a board of one's own sends frames."""
 
 _BEGUN = (*TEMPLATES, SENDER)
-_KIND = Option(f"What to begin: {', '.join(_BEGUN)}.", "KIND", argument=True, offers=words(*_BEGUN))
 _FOLDER = Option(
     "Of a sender: folder to write; without it, what to do with it is printed.", "[FOLDER]", argument=True,
     writes=OutputFolder(()), what=SENDER,
 )  # fmt: skip
-_OUT = Option("File to write (.toml); printed without it.", "FILE", writes=TOML_FILE)
-_SCHEMA = Option("JSON schema to write (.json), for completion in an editor.", "FILE", writes=JSON_SCHEMA)
+_OUT = Option("File to write (.toml); printed without it.", "FILE", writes=OutputFile("a TOML file", (".toml",)))
 
 
 @dataclass(frozen=True)
@@ -67,11 +64,11 @@ def _report(text: str, given: Any) -> Begun:
 
 @command(report=_report, files=_files, results=lambda: (Begun,))
 def new(
-    kind: Annotated[str, _KIND],
+    kind: Annotated[str, Option(f"What to begin: {', '.join(_BEGUN)}.", "KIND", argument=True, offers=_BEGUN)],
     folder: Annotated[str | Path | None, _FOLDER] = None,
     *,
     out: Annotated[str | Path | None, _OUT] = None,
-    schema: Annotated[str | Path | None, _SCHEMA] = None,
+    schema: Annotated[str | Path | None, SCHEMA_OUT.also(", for completion in an editor")] = None,
 ) -> str:
     """Return a commented file to edit: an array, part, column map, twin, scenario, frame, stage, plan or brief.
 
@@ -92,7 +89,6 @@ def new(
     from gfimu.base.files.atomic_file import write_text
     from gfimu.base.files.model_files import find_model
     from gfimu.base.files.schema import json_schema
-    from gfimu.commands.file_kinds import file_schema
 
     if kind == SENDER:
         if out is not None or schema is not None:

@@ -13,18 +13,20 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
+from gfimu.base.files.outputs import OutputFile
 from gfimu.commands import given
 from gfimu.commands.known_axis import AXIS_PLACE, AxisLike, as_known_axis
 from gfimu.commands.shell import options
 from gfimu.commands.shell.declare import Option, command
-from gfimu.commands.shell.output_files import KALIBR
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from gfimu.sensor_noise import RecordingNoise
 
 __all__ = ["noise"]
+
+
+_STRETCH = Option("Samples to use: rest (the longest one) or all (up to the first gap).", "KIND")
+_KALIBR = Option("Kalibr file to write (.yaml).", writes=OutputFile("a Kalibr file", (".yaml", ".yml")), what="Kalibr")
 
 
 def _results() -> tuple[type, ...]:
@@ -38,15 +40,10 @@ def _results() -> tuple[type, ...]:
 def noise(
     recording: Annotated[given.Run, given.RUN.also(" at rest: .csv, .parquet, a MIMU4444 stream, or text rows.")],
     *,
-    stretch: Annotated[
-        Literal["rest", "all"],
-        Option("Samples to use: rest (the longest one) or all (up to the first gap).", "KIND"),
-    ] = "rest",
+    stretch: Annotated[Literal["rest", "all"], _STRETCH] = "rest",
     rest_threshold: Annotated[float | None, options.REST_THRESHOLD] = None,
     calibration: given.CalibrationToApply = None,
-    kalibr: Annotated[
-        "str | Path | None", Option("Kalibr file to write (.yaml).", writes=KALIBR, what="Kalibr")
-    ] = None,
+    kalibr: Annotated["str | Path | None", _KALIBR] = None,
     picture: given.Picture = None,
     force: Annotated[bool, options.FORCE] = False,
     column_map: given.Map = None,

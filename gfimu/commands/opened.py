@@ -80,7 +80,8 @@ def as_source(
     from gfimu.base.files.memory import with_memory
     from gfimu.recording import Recording
     from gfimu.recording.importing import load_map
-    from gfimu.recording.mapped import MappedFile
+    from gfimu.recording.mapped import MappedFile, mapped_recording
+    from gfimu.recording.tables.table_columns import TableColumns
 
     if is_arrays(recording):
         if column_map is not None:
@@ -89,17 +90,20 @@ def as_source(
             raise InputError("NumPy arrays: times and readings do not name their array; give it as array=")
         return Recording.from_arrays(*recording, as_array(array))
     if not isinstance(recording, Recording | str | Path | MappedFile):
-        return _of_table(recording, array, column_map)
+        if column_map is None:
+            table = recording if isinstance(recording, TableColumns) else TableColumns(recording)
+            return cast("RecordingSource", table)
+        geometry = None if array is None else as_array(array)
+        return mapped_recording(cast("ArrowStream", recording), column_map, array=geometry)
     if isinstance(recording, str | Path):
         recording = with_memory(recording, max_memory)
         return recording if column_map is None else files_by_map([recording], column_map)
     if isinstance(recording, MappedFile):
-        recording = recording.with_memory(max_memory)
-    if column_map is None:
-        return recording
-    if isinstance(recording, MappedFile):
-        return replace(recording, column_map=load_map(column_map))
-    raise InputError("a map is for a file, and this recording has been read already; give its file")
+        bounded = recording.with_memory(max_memory)
+        return bounded if column_map is None else replace(bounded, column_map=load_map(column_map))
+    if column_map is not None:
+        raise InputError("a map is for a file, and this recording has been read already; give its file")
+    return recording
 
 
 def is_arrays(recording: object) -> TypeGuard[tuple[ArrayLike, ArrayLike]]:
@@ -108,21 +112,6 @@ def is_arrays(recording: object) -> TypeGuard[tuple[ArrayLike, ArrayLike]]:
 
     kinds = (np.ndarray, list)
     return isinstance(recording, tuple) and len(recording) == 2 and all(isinstance(one, kinds) for one in recording)
-
-
-def _of_table(
-    table: object,
-    array: AccelerometerArray | str | Path | None,
-    column_map: ColumnMap | str | Path | None,
-) -> RecordingSource:
-    from gfimu.recording.importing import load_map
-    from gfimu.recording.mapped import mapped_recording
-    from gfimu.recording.tables.table_columns import TableColumns
-
-    if column_map is None:
-        return cast("RecordingSource", table if isinstance(table, TableColumns) else TableColumns(table))
-    chosen = load_map(column_map)
-    return mapped_recording(cast("ArrowStream", table), chosen, array=None if array is None else as_array(array))
 
 
 def files_by_map(files: Sequence[str | Path], column_map: ColumnMap | str | Path) -> MappedFile:
@@ -154,12 +143,9 @@ def as_calibrated_run(
     Without an array it is the recording's own.
     """
     from gfimu.calibration.run_file import open_calibrated_run
-    from gfimu.recording.formats import open_run
 
-    given = None if array is None else as_array(array)
-    if calibration is None:
-        return open_run(recording, given)
-    return open_calibrated_run(recording, as_calibration(calibration), given)
+    unit = None if calibration is None else as_calibration(calibration)
+    return open_calibrated_run(recording, unit, None if array is None else as_array(array))
 
 
 def as_twin(twin: WorldModel | str | Path, *, allow_code: bool) -> WorldModel:

@@ -15,12 +15,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from gfimu.base.errors import InputError
-from gfimu.base.files.outputs import OutputFolder
+from gfimu.base.files.outputs import OutputFile, OutputFolder
 from gfimu.commands import given
 from gfimu.commands.opened import as_array
 from gfimu.commands.shell import completion, options
 from gfimu.commands.shell.declare import Option, command
-from gfimu.commands.shell.output_files import ARRAY_FILE
 
 if TYPE_CHECKING:
     import numpy as np
@@ -37,6 +36,9 @@ _MOST_CHIPS, _MOST_RESTARTS = 200, 100_000  # more take days
 _MORE_CHIPS = 4  # of a front over chips, beyond the least number, unless the largest is given
 _FRONT = OutputFolder(("front.json", "front.png"), needs=("matplotlib",))
 
+_OUT = Option("Array file to write (.toml).", writes=OutputFile("an array file", (".toml",)), what="array")
+_FRONT_OUT = Option("Folder to write: the front as picture, table and array files.", writes=_FRONT)
+_RNG = Option("Random number generator in place of the seed.", shell=False)
 _BRIEF = Option(
     "Design brief (.toml; gfimu new brief); options replace its values.", "[BRIEF]", argument=True, reads=True
 )
@@ -68,14 +70,10 @@ def optimize(
     most_chips: Annotated[int | None, _MOST] = None,
     restarts: Annotated[int | None, Option("Most random starts; 40 by default, fewer once ten agree.")] = None,
     seed: Annotated[int | None, options.SEED.also("; by default that of the brief, or 0")] = None,
-    out: Annotated["str | Path | None", Option("Array file to write (.toml).", writes=ARRAY_FILE, what="array")] = None,
+    out: Annotated["str | Path | None", _OUT] = None,
     picture: Annotated[given.Picture, options.PICTURE.also(": the array in its volume")] = None,
-    front: Annotated[
-        "str | Path | None", Option("Folder to write: the front as picture, table and array files.", writes=_FRONT)
-    ] = None,
-    rng: Annotated[
-        "np.random.Generator | None", Option("Random number generator in place of the seed.", shell=False)
-    ] = None,
+    front: Annotated["str | Path | None", _FRONT_OUT] = None,
+    rng: Annotated["np.random.Generator | None", _RNG] = None,
     part: Annotated[str | None, Option("Part of the chips; by default that of the brief.", shell=False)] = None,
     name: Annotated[str, Option("Name of the array; by default that of its file.", shell=False)] = "",
     progress: Annotated[Callable[[float], None] | None, options.PROGRESS] = None,
@@ -136,9 +134,11 @@ def optimize(
     source = np.random.default_rng(wanted.seed) if rng is None else rng
     starts = wanted.starts
     if pareto is not None and front is not None:
+        from gfimu.array_search.pictures import write_front
+
         most = most_chips or problem.n_chips + _MORE_CHIPS
         arrays = find_front(problem, conditions, pareto, source, most_chips=most, starts=starts, report=progress)
-        _write_front(Path(front), arrays)
+        write_front(front, arrays)
         return arrays
     goal = named(wanted.objective.name, problem, conditions)
     name = name or ("" if out is None else Path(out).stem)
@@ -172,20 +172,3 @@ def _sites(wanted: "BriefFile", brief: str | Path | None) -> "Sites | None":
             f"[volume] file = {table.file!r}: candidate sites come from .xml, .toml or .csv; use one of them"
         )
     return sites_of_csv(path)
-
-
-def _write_front(folder: Path, found: "Front") -> None:
-    import json
-
-    from gfimu.array_search.pictures import front_picture
-    from gfimu.base.files.atomic_file import write_text
-
-    folder.mkdir(exist_ok=True)
-    for point in found.points:
-        write_text(folder / f"{point.name}.toml", point.array.to_toml())
-    write_text(folder / "front.json", json.dumps(found.to_dict(), indent=2) + "\n")
-    front_picture(folder / "front.png", found)
-    written = {f"{point.name}.toml" for point in found.points}
-    for file in folder.glob("front_[0-9][0-9].toml"):  # of the front that this one replaces, which had more points
-        if file.name not in written:
-            file.unlink()

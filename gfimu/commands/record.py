@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from firmware_bridge.host.record_report import RecordReport
     from firmware_bridge.host.recorder import Batch
     from gfimu.array.array import AccelerometerArray
-    from gfimu.visual.live import LivePicture
 
 __all__ = ["record"]
 
@@ -50,9 +49,6 @@ _PORT = PORT.also(
     "or phyphox://address:port",
     reads=True,
 )
-_FIND = Option("Look for the board: every port or --port, every speed and format.")
-_SELF_TEST = Option("Test the chips first, at rest, against the data sheet's limits.")
-_LIVE = Option("Show rate, health and scene in the rerun viewer meanwhile.")
 _BOARD = Group(
     BoardSettings, "The board: ``gfimu.BoardSettings(rate=800, array='cube12')``; by default as it is, or says."
 )
@@ -64,12 +60,12 @@ def record(
     port: Annotated[str, _PORT] = "",
     out: Annotated["str | Path | None", RECORDING_OUT] = None,
     *,
-    find: Annotated[bool, _FIND] = False,
-    self_test: Annotated[bool, _SELF_TEST] = False,
+    find: Annotated[bool, Option("Look for the board: every port or --port, every speed and format.")] = False,
+    self_test: Annotated[bool, Option("Test the chips first, at rest, against the data sheet's limits.")] = False,
     duration: Annotated[float | None, DURATION.also("; else until Ctrl-C", least=0.0)] = None,
     board: Annotated["BoardSettings | None", _BOARD] = None,
     rrd: Annotated["str | Path | None", RRD.also(" while recording")] = None,
-    live: Annotated[bool, _LIVE] = False,
+    live: Annotated[bool, Option("Show rate, health and scene in the rerun viewer meanwhile.")] = False,
     callbacks: Annotated["RecordCallbacks | None", _CALLBACKS] = None,
 ) -> "RecordReport | None":
     """Record from a board, real or virtual, until the duration ends, a callback says so, or Ctrl-C.
@@ -143,10 +139,16 @@ def record(
         if view is not None or not (has_picture or callbacks.on_text is not None or callbacks.on_fault is not None):
             return
         if array is not None:
+            picture = None
+            if has_picture:
+                viewer.quiet_sdk()
+                from gfimu.visual.live import LivePicture  # imports the SDK
+
+                picture = LivePicture(array)
             view = LiveView(
                 array, form.count_size(array), on_text=callbacks.on_text, on_fault=callbacks.on_fault,
                 on_note=callbacks.on_note, rrd=None if rrd is None else Path(rrd), viewer=viewer if live else None,
-                picture=_picture(array) if has_picture else None,
+                picture=picture,
             )  # fmt: skip
         elif has_picture:
             raise InputError("--live and --rrd draw the array, which the board does not state; give it with --array")
@@ -176,12 +178,3 @@ def record(
         warn(f"{report.path}: {text}")
     faults = () if view is None else view.faults
     return replace(report, faults=tuple(entry for fault in faults for entry in fault.entries()))
-
-
-def _picture(array: "AccelerometerArray") -> "LivePicture":
-    from gfimu.visual.viewer import quiet_sdk
-
-    quiet_sdk()
-    from gfimu.visual.live import LivePicture
-
-    return LivePicture(array)

@@ -16,9 +16,10 @@ from typing import Annotated, Any
 from gfimu.base.declared import Declared, figure, struct_of, structs_of
 from gfimu.base.errors import check_name
 from gfimu.base.files.schema import about
+from gfimu.commands.shell.command_list import COMMANDS, declared_commands
 from gfimu.commands.shell.completion import beginning
 from gfimu.commands.shell.declare import Option, command
-from gfimu.commands.shell.output_files import JSON_SCHEMA
+from gfimu.commands.shell.options import SCHEMA_OUT
 
 __all__ = ["schema", "schema_names"]
 
@@ -48,40 +49,28 @@ _CERTIFICATE = "certificate"  # whose schema is published with its format
 
 def schema_names() -> tuple[str, ...]:
     """Return the commands whose results have a schema."""
-    from gfimu.commands.shell.command_list import COMMANDS, declared_commands
-
     return tuple(sorted(one.name for file in COMMANDS for one in declared_commands(file)))
 
 
-def _kinds(name: str) -> tuple[list[Any], list[Any]]:
-    """Return the structs of what a command prints, and those that they name by reference only."""
-    from gfimu.commands.shell.command_list import declared_commands
+def _kinds(name: str) -> tuple[list[Any], list[Any], dict[str, bool]]:
+    """Return what a command prints, the structs that this names by reference only, and to which files are added.
 
+    A command of several results does not write with each, so that theirs may lack the key ``files``: the value there.
+    """
     declared = next(one for one in declared_commands(name.split(maxsplit=1)[0]) if one.name == name)
     whole = [declared, *(part.__command__ for part in declared.parts)]
     results = [(one, kind) for one in whole for kind in one.results()]
-    kinds, parts = [], []
+    kinds, parts, with_files = [], [], {}
     for one, kind in results:
         if not (isinstance(kind, type) and issubclass(kind, Declared)):
             kinds.append(kind)
             continue
         root, *inner = structs_of(kind)
-        named = one.names_files(kind)
-        kinds.append(_with_files(root, always=len(one.results()) == 1) if named else root)
+        kinds.append(root)
         parts += [part for part in inner if part not in kinds]
-    return kinds, parts
-
-
-def _with_files(kind: Any, *, always: bool) -> Any:
-    """Return a struct with the key that the machine of commands adds: the files that were written.
-
-    A command of several results does not write with each, so that theirs may lack the key.
-    """
-    import msgspec
-
-    files = ("files", Files) if always else ("files", Files | msgspec.UnsetType, msgspec.UNSET)
-    more = {"__doc__": kind.__doc__}
-    return msgspec.defstruct(kind.__name__, [files], bases=(kind,), namespace=more, kw_only=True)
+        if one.names_files(kind):
+            with_files[root.__name__] = len(one.results()) == 1
+    return kinds, parts, with_files
 
 
 def _offers(incomplete: str) -> list[tuple[str, str]]:
@@ -90,7 +79,6 @@ def _offers(incomplete: str) -> list[tuple[str, str]]:
 
 
 _COMMAND = Option("Command: estimate, or campaign table.", "COMMAND...", kind=list[str], argument=True, offers=_offers)
-_OUT = Option("JSON schema to write (.json); printed without it.", "FILE", writes=JSON_SCHEMA)
 
 
 def _run(given: Mapping[str, Any], as_json: bool) -> None:
@@ -104,7 +92,11 @@ def _run(given: Mapping[str, Any], as_json: bool) -> None:
 
 
 @command(run=_run, results=lambda: (dict[str, Any],))
-def schema(command: Annotated[str, _COMMAND], *, out: Annotated[str | Path | None, _OUT] = None) -> dict[str, Any]:
+def schema(
+    command: Annotated[str, _COMMAND],
+    *,
+    out: Annotated[str | Path | None, SCHEMA_OUT.also("; printed without it")] = None,
+) -> dict[str, Any]:
     """Return the JSON schema (2020-12) of a command's output with ``--json``, errors included.
 
     Raises
@@ -124,14 +116,21 @@ def schema(command: Annotated[str, _COMMAND], *, out: Annotated[str | Path | Non
 
     name = " ".join(command.split())
     check_name("command", name, schema_names())
-    kinds, parts = _kinds(name)
+    kinds, parts, with_files = _kinds(name)
     references, definitions = msgspec.json.schema_components(
         [*kinds, struct_of(Failed), *parts], ref_template="#/$defs/{name}"
     )
     found = list(references[: len(kinds) + 1])
     if name == _CERTIFICATE:
+        from gfimu.calibration.certificate.schema import certificate_schema
+
         found.insert(0, {"$ref": "#/$defs/Certificate"})
-        definitions = _certified(msgspec.json.schema(Files)) | definitions
+        definitions = json.loads(certificate_schema())["$defs"] | definitions
+        with_files = {"Certificate": True}
+    for kind, always in with_files.items():
+        definitions[kind]["properties"]["files"] = msgspec.json.schema(Files)
+        if always:
+            definitions[kind].setdefault("required", []).append("files")
     what = "Each line that" if name in _STREAMS else "What"
     content: dict[str, Any] = {
         "$schema": _DIALECT,
@@ -144,13 +143,3 @@ def schema(command: Annotated[str, _COMMAND], *, out: Annotated[str | Path | Non
     if out is not None:
         write_text(out, json.dumps(content, indent=1, ensure_ascii=False) + "\n")
     return content
-
-
-def _certified(files: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the definitions of a certificate as the command prints it: with the files that were written."""
-    from gfimu.calibration.certificate.schema import certificate_schema
-
-    definitions: dict[str, Any] = json.loads(certificate_schema())["$defs"]
-    definitions["Certificate"]["properties"]["files"] = dict(files)
-    definitions["Certificate"]["required"].append("files")
-    return definitions

@@ -18,10 +18,11 @@ from typing import TYPE_CHECKING, Annotated
 
 from gfimu.base.declared import Declared, FileText, figure
 from gfimu.base.errors import InputError, unknown_name
+from gfimu.base.files.model_files import find_model, list_models, read_toml
+from gfimu.commands import given
 from gfimu.commands.list import catalogue
 from gfimu.commands.shell import completion
 from gfimu.commands.shell.declare import Option, command
-from gfimu.commands.shell.options import MAX_MEMORY
 
 if TYPE_CHECKING:
     from gfimu.base.files.memory import MemorySize
@@ -47,8 +48,8 @@ class Shown(Declared):
         yield FileText(self.text)
 
 
-@command(report=lambda text, given: Shown(given["name"], text), results=lambda: (Shown,))
-def show(name: Annotated[str, _NAME], *, max_memory: Annotated["MemorySize | None", MAX_MEMORY] = None) -> str:
+@command(report=lambda text, values: Shown(values["name"], text), results=lambda: (Shown,))
+def show(name: Annotated[str, _NAME], *, max_memory: given.Memory = None) -> str:
     """Return the text of a shipped file, of a file of your own, of the array in a recording, or of an effect.
 
     A file of one's own is checked; of a recording the array file is returned.
@@ -64,8 +65,6 @@ def show(name: Annotated[str, _NAME], *, max_memory: Annotated["MemorySize | Non
     >>> print(gfimu.show("rest").splitlines()[0])
     # The unit at rest: noise, biases, drift. Turned on its side with: --set 'mounting_rotvec_rad=[1.5708, 0, 0]'.
     """
-    from gfimu.base.files.model_files import find_model, list_models
-
     if Path(name).suffix in {".toml", ".csv", ".parquet"}:
         return _shown_file(name, max_memory)
     for kind in _FILES:
@@ -83,7 +82,6 @@ def show(name: Annotated[str, _NAME], *, max_memory: Annotated["MemorySize | Non
 def _shown_file(name: str, max_memory: "MemorySize | None") -> str:
     """Return the text of a file after a check by its schema, or the array file that a recording carries."""
     from gfimu.base.files.memory import with_memory
-    from gfimu.base.files.model_files import read_toml
     from gfimu.commands.file_kinds import check_file
     from gfimu.recording import Recording
 

@@ -13,13 +13,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from gfimu.base.errors import InputError
+from gfimu.commands import given
 from gfimu.commands.shell.declare import Option, command
 from gfimu.commands.shell.options import MAX_MEMORY, RECORDING_OUT, RRD, SCENARIO, SEED, SHARE
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from gfimu.base.files.memory import MemorySize
     from gfimu.recording import Recording
     from sim.scenarios import Scenario
     from sim.simulation import Simulated
@@ -27,22 +27,21 @@ if TYPE_CHECKING:
 __all__ = ["simulate"]
 
 _CHANGES = Option("Change a key of the scenario file; may be repeated.", "KEY=VALUE", name="--set", kind=list[str])
-_RAW = Option("Keep the readings as counts of the converter.")
 
 
 def _recording(simulated: "Simulated") -> "Recording":
     return simulated.recording
 
 
-@command(gives=_recording, doing=lambda given: f"simulating {given['scenario']}")
+@command(gives=_recording, doing=lambda values: f"simulating {values['scenario']}")
 def simulate(
     scenario: Annotated["Scenario | str | Path", SCENARIO.also(" or a twin file", argument=True)],
     *,
     out: Annotated["str | Path | None", RECORDING_OUT.also(needed=True)] = None,
     seed: Annotated[int, SEED] = 0,
     changes: Annotated["Sequence[str]", _CHANGES] = (),
-    raw: Annotated[bool, _RAW] = False,
-    max_memory: Annotated["MemorySize | None", MAX_MEMORY.also("; of the run, half of the machine's")] = None,
+    raw: Annotated[bool, Option("Keep the readings as counts of the converter.")] = False,
+    max_memory: Annotated[given.Memory, MAX_MEMORY.also("; of the run, half of the machine's")] = None,
     rrd: Annotated["str | Path | None", RRD] = None,
     progress: Annotated["Callable[[float], None] | None", SHARE] = None,
 ) -> "Simulated":

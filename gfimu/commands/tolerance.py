@@ -9,7 +9,6 @@ gfimu tolerance cube12 --closed-form --part adxl355 --calibrated poses+rest
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -28,8 +27,6 @@ if TYPE_CHECKING:
 __all__ = ["tolerance"]
 
 _LEAST_UNITS, _MOST_UNITS = 10, 100_000  # fewer have no spread to speak of; more take hours
-_USUAL_TIME_S = 3.0  # of the reference motion: a second at the rate, after rest and ramp
-_MOST_SAMPLES = 6000  # numerical: memory of the first-order maps, 1 GB with 24 channels
 _SHEET = "; else the data sheet's"
 
 _SCENARIO = options.SCENARIO.also("; by default rest, then a spin about the vertical", when="Motion. ")
@@ -39,7 +36,7 @@ _CALIBRATED = Option(
     "none, rest, poses or poses+rest; may be repeated; all that are possible by default.",
     "NAME",
     kind=list[str],
-    offers=completion.words("none", "rest", "poses", "poses+rest"),
+    offers=("none", "rest", "poses", "poses+rest"),
 )
 _PICK_UP = Option(f"Pick-up of each other axis of the chip, 1 σ, %{_SHEET}.")
 
@@ -119,7 +116,7 @@ def tolerance(
     from gfimu.commands.opened import as_array
     from sim.trials.sweep.executors import processors
     from sim.trials.worlds.tolerance_units import UnitTask, simulate_units
-    from sim.trials.worlds.toleranced import calibration_poses, known_motion_of
+    from sim.trials.worlds.toleranced import calibration_poses, known_motion_of, tolerated_run
 
     _check("--position-mm", position_mm)
     _check("--angle-deg", angle_deg)
@@ -133,7 +130,7 @@ def tolerance(
         drawn, name = drawn.with_part_file(part)
         drawn = drawn.with_part(name)
     require_all_motions(drawn, or_axis=False)
-    run, words = _run(drawn, scenario, duration, speed_rad_s)
+    run, words = tolerated_run(drawn, scenario, duration=duration, rate=speed_rad_s)
     motion = known_motion_of(run)
     for name in calibrated:
         check_calibration(name, drawn, motion)
@@ -174,36 +171,3 @@ def _scaled(option: str, value: float | None, unit: float) -> float | None:
     """Return a value of an option in SI units."""
     _check(option, value)
     return None if value is None else value * unit
-
-
-def _run(
-    array: "AccelerometerArray", scenario: "Scenario | str | Path | None", duration: float | None, speed_rad_s: float
-) -> "tuple[Scenario, str]":
-    """Return the run with the array as drawn and nothing wrong in it, and what it is in words."""
-    from sim.scenarios import Scenario
-    from sim.trials.worlds.toleranced import LEAST_TIME_S, REST_S, reference_motion
-
-    if scenario is None:
-        length = _USUAL_TIME_S if duration is None else duration
-        if not LEAST_TIME_S < length < math.inf:
-            raise InputError(f"--duration {length:g}: the default motion is longer than {LEAST_TIME_S:g} s; give more")
-        if not 0.0 < abs(speed_rad_s) <= 1e3:
-            raise InputError(f"--speed-rad-s {speed_rad_s:g}: give a rate of at most 1000 rad/s that is not zero")
-        run = reference_motion(array, time=length, rate=speed_rad_s)
-        words = (
-            f"at rest for {REST_S:g} s, then spun up to {speed_rad_s:g} rad/s about the vertical, {length:g} s in all"
-        )
-    else:
-        chosen = scenario if isinstance(scenario, Scenario) else Scenario.load(scenario)
-        length = chosen.duration if duration is None else duration
-        if not 0.0 < length <= chosen.duration:
-            raise InputError(
-                f"--duration {length:g}: scenario {chosen.name!r} lasts {chosen.duration:g} s; give at most that"
-            )
-        run = replace(chosen, array=array, part=None, duration=length, driven=False, effects=(), earth=None)
-        words = f"scenario {chosen.name}, {length:g} s"
-    if not 10 <= round(run.duration * run.sample_rate) <= _MOST_SAMPLES:
-        raise InputError(
-            f"the run has {run.duration * run.sample_rate:.0f} samples; give a --duration with 10 to {_MOST_SAMPLES}"
-        )
-    return run, words

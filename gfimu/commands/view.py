@@ -18,25 +18,20 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from gfimu.base.files.outputs import RERUN, check_outputs
 from gfimu.base.optional_packages import require
+from gfimu.commands import given
 from gfimu.commands.known_axis import AXIS_ALONE, AxisLike, as_known_axis
 from gfimu.commands.shell.declare import Option, command
-from gfimu.commands.shell.options import ARRAY, FORCE, MAP, MAX_MEMORY
+from gfimu.commands.shell.options import FORCE, file_argument
 
 if TYPE_CHECKING:
-    from gfimu.array.array import AccelerometerArray
-    from gfimu.base.files.memory import MemorySize
     from gfimu.diagnosis.verdict.verdict import Diagnosis
     from gfimu.motion.estimate import Estimate
-    from gfimu.recording.importing import ColumnMap
     from gfimu.recording.mapped import RecordingLike
     from gfimu.visual.picture import Viewed
 
 __all__ = ["view"]
 
-_FILE = Option(
-    "A .rrd file, or a recording or estimate (.csv, .parquet, .bin) to make one from.", "FILE", kind=Path,
-    argument=True, reads=True,
-)  # fmt: skip
+_FILE = file_argument("A .rrd file, or a recording or estimate (.csv, .parquet, .bin) to make one from.", "FILE")
 _OUT = Option("Rerun recording to write (.rrd); the viewer is not opened.", writes=RERUN)
 
 
@@ -49,12 +44,12 @@ def _opened(viewed: "Viewed") -> Path:
     return viewed.picture
 
 
-def _show(given: Mapping[str, Any], as_json: bool) -> None:
+def _show(values: Mapping[str, Any], as_json: bool) -> None:
     """Name a picture before the viewer opens, which stays open as long as its user likes."""
     from gfimu.commands.shell.output import print_json, print_paths, progress
 
     with progress("making the picture"):
-        viewed = inspect.unwrap(view)(**given)
+        viewed = inspect.unwrap(view)(**values)
     files = {"rerun recording": viewed.picture}
     if not viewed.made:
         _opened(viewed)
@@ -70,9 +65,9 @@ def _show(given: Mapping[str, Any], as_json: bool) -> None:
 def view(
     file: Annotated["RecordingLike | Estimate | Diagnosis", _FILE],
     *,
-    array: Annotated["AccelerometerArray | str | Path | None", ARRAY.also("; else the recording's own")] = None,
-    column_map: Annotated["ColumnMap | str | Path | None", MAP] = None,
-    max_memory: Annotated["MemorySize | None", MAX_MEMORY] = None,
+    array: given.Array = None,
+    column_map: given.Map = None,
+    max_memory: given.Memory = None,
     axis: Annotated[AxisLike, AXIS_ALONE] = None,
     out: Annotated["str | Path | None", _OUT] = None,
     force: Annotated[bool, FORCE] = False,

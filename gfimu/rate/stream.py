@@ -7,19 +7,20 @@ import itertools
 import json
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, Protocol
+from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from gfimu.array.array import AccelerometerArray
 from gfimu.array.parts.part import Part
 from gfimu.array.parts.plausible import largest_of_array
 from gfimu.base.declared import Declared, figure
 from gfimu.base.errors import InputError
+from gfimu.rate.health.live.watched_filter import WatchedRateFilter
 from gfimu.rate.kalman import FilterSettings
 from gfimu.rate.live import LiveRateFilter
-from gfimu.rate.result import ChannelReport, RateEstimate
+from gfimu.rate.result import RateEstimate
 from gfimu.rate.sensing import SensorErrors
 from gfimu.recording import Recording
 from gfimu.recording.checks import examine
@@ -29,7 +30,6 @@ from gfimu.recording.tables.column_file import head_line
 __all__ = [
     "LiveSample",
     "SkippedLine",
-    "StreamFilter",
     "StreamLayout",
     "StreamSample",
     "examined_lines",
@@ -40,32 +40,6 @@ __all__ = [
 
 _START_S = 3.0  # of a stream, which are examined
 _FEWEST, _MOST = 50, 5000  # numerical: samples of that start, whatever the rate
-
-
-class StreamFilter(Protocol):
-    """A rate filter on a stream that watches its channels (`gfimu.rate.health.live.watched_filter`)."""
-
-    @property
-    def report(self) -> ChannelReport:
-        """What was wrong with the channels so far."""
-        ...
-
-    @property
-    def health(self) -> list[int] | None:
-        """Health of each channel now (`gfimu.rate.health.fault.HealthCode`); None while nothing is watched."""
-        ...
-
-    def push(self, t: ArrayLike, readings: ArrayLike, gyro: ArrayLike | None = None) -> RateEstimate:
-        """Take one sample; return the estimates that are ready."""
-        ...
-
-    def finish(self) -> RateEstimate:
-        """Return the estimates of the last samples."""
-        ...
-
-    def take_news(self) -> list[dict[str, Any]]:
-        """Return what changed since this was asked last: one line each, as JSON can hold it."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -275,7 +249,7 @@ def filter_stream(
     settings: FilterSettings | None = None,
     *,
     fuse_gyro: bool = False,
-    watched: StreamFilter | None = None,
+    watched: WatchedRateFilter | None = None,
 ) -> Iterator[str]:
     """Filter a stream of CSV lines, sample by sample.
 
@@ -301,7 +275,7 @@ def filter_stream(
         Start, quadrature, rest.
     fuse_gyro : bool
         Whether to use the stream's gyro columns.
-    watched : StreamFilter, optional
+    watched : WatchedRateFilter, optional
         A filter that watches its channels, in place of one by ``settings``.
 
     Yields

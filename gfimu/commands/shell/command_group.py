@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -13,7 +14,7 @@ from gfimu.commands.shell.assemble import shell_command
 from gfimu.commands.shell.command import CommandApp, GfimuGroup, RunGroup
 from gfimu.commands.shell.command_list import COMMANDS, JOBS, declared_commands, help_line
 from gfimu.commands.shell.completion import Offer
-from gfimu.commands.shell.declare import Command, module_help
+from gfimu.commands.shell.declare import module_help
 
 __all__ = ["JSON_ASKED", "CommandGroup"]
 
@@ -60,18 +61,10 @@ class CommandGroup(GfimuGroup):
 class _Commands(Mapping[str, Any]):
     """Commands by name, each made when it is asked for."""
 
-    def __init__(self) -> None:
-        self._loaded: dict[str, Any] = {}
-
     def __getitem__(self, name: str) -> Any:
         if name not in COMMANDS:
             raise KeyError(name)
-        if name not in self._loaded:
-            app = CommandApp()
-            app.callback()(_no_options)  # a group even where a file registers one command
-            add_commands(app, name, declared_commands(name))
-            self._loaded[name] = typer.main.get_command(app).commands[name]  # type: ignore[attr-defined]
-        return self._loaded[name]
+        return _made(name)
 
     def __iter__(self) -> Iterator[str]:
         return iter(COMMANDS)
@@ -80,18 +73,18 @@ class _Commands(Mapping[str, Any]):
         return len(COMMANDS)
 
 
-def add_commands(app: CommandApp, name: str, declared: list[Command]) -> None:
-    """Add the command of a file to the program; several as a group, in which the one of its name is called run."""
+@functools.cache
+def _made(name: str) -> Any:
+    """Return the command of a file; several are a group, in which the one of its name is called run."""
+    declared, app = declared_commands(name), CommandApp()
+    app.callback()(lambda: None)  # a group even where a file registers one command
     if [one.name for one in declared] == [name]:
         app.command(name=name, help=declared[0].help)(shell_command(declared[0]))
-        return
-    kind = RunGroup if any(one.name == name for one in declared) else GfimuGroup
-    group = CommandApp(cls=kind, help=module_help(declared[0].function), no_args_is_help=True)
-    app.add_typer(group, name=name)
-    for one in declared:
-        inner = one.name.removeprefix(name).strip() or RunGroup.default
-        group.command(name=inner, help=one.help)(shell_command(one))
-
-
-def _no_options() -> None:
-    """Take no options."""
+    else:
+        kind = RunGroup if any(one.name == name for one in declared) else GfimuGroup
+        group = CommandApp(cls=kind, help=module_help(declared[0].function), no_args_is_help=True)
+        app.add_typer(group, name=name)
+        for one in declared:
+            inner = one.name.removeprefix(name).strip() or RunGroup.default
+            group.command(name=inner, help=one.help)(shell_command(one))
+    return typer.main.get_command(app).commands[name]  # type: ignore[attr-defined]

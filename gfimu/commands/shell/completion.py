@@ -20,11 +20,9 @@ __all__ = [
     "scenarios",
     "shown",
     "twins",
-    "words",
 ]
 
 Values = list[tuple[str, str]]
-Offers = Callable[[str], Values]
 
 _UNKNOWN = "unknown"  # stands in the catalogue for what no effect explains; no run can be designed for it
 
@@ -38,12 +36,7 @@ class Offer:
     type: str = "plain"
 
 
-def words(*fixed: str) -> Offers:
-    """Return the function that offers fixed words."""
-    return lambda incomplete: beginning(incomplete, fixed)
-
-
-def _models(kind: str) -> Offers:
+def _models(kind: str) -> Callable[[str], Values]:
     """Return the function that offers the files of a kind that come with gfimu."""
 
     def offer(incomplete: str) -> Values:

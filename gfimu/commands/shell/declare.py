@@ -11,16 +11,16 @@ import functools
 import inspect
 import re
 import textwrap
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, is_dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal, ParamSpec, Protocol, TypeVar, get_args, get_origin, overload
+from typing import Annotated, Any, Literal, ParamSpec, TypeVar, get_args, get_origin, overload
 
 from gfimu.base.declared import Declared
 from gfimu.base.errors import InputError, did_you_mean, unknown_name
 from gfimu.base.files.outputs import Output, OutputFolder, check_outputs
 from gfimu.base.lazy_names import declared_names
-from gfimu.commands.shell.completion import words
+from gfimu.commands.shell.completion import beginning
 from gfimu.commands.shell.named_files import files_named
 
 __all__ = ["Command", "Group", "Option", "choices_of", "command", "command_of", "marked", "module_help"]
@@ -47,8 +47,8 @@ class Option:
         Type of the value on the shell, where the Python parameter takes objects too; where it takes a path, a path.
     panel : str
         Heading under which help lists the option; empty for the first list.
-    offers : callable, optional
-        Returns the values that shell completion offers; a ``Literal`` offers its own values.
+    offers : callable or sequence of str, optional
+        The words that shell completion offers, or what returns them with descriptions; a ``Literal`` offers its own.
     reads : bool
         Whether the value names files that the command reads, so that no output may replace them.
     writes : OutputFile or OutputFolder, optional
@@ -71,7 +71,7 @@ class Option:
     name: str = ""
     kind: Any = None
     panel: str = ""
-    offers: Callable[[str], list[tuple[str, str]]] | None = None
+    offers: Callable[[str], list[tuple[str, str]]] | Sequence[str] = ()
     reads: bool = False
     writes: Output | None = None
     what: str | Callable[[Path], str] = ""
@@ -89,9 +89,9 @@ class Option:
         import typer  # not for those who call the function
 
         text = self.text if self.text.endswith((".", "?")) else f"{self.text}."
-        choices = get_args(kind) if get_origin(kind) is Literal else ()
-        offers = words(*choices) if choices and self.offers is None else self.offers
-        settings: dict[str, Any] = {"help": text, "metavar": self.metavar or None, "autocompletion": offers}
+        words = self.offers or (get_args(kind) if get_origin(kind) is Literal else ())
+        offers = words if callable(words) or not words else lambda incomplete: beginning(incomplete, words)
+        settings: dict[str, Any] = {"help": text, "metavar": self.metavar or None, "autocompletion": offers or None}
         if self.argument:
             return typer.Argument(**settings)
         return typer.Option(self.flag(name), rich_help_panel=self.panel or None, min=self.least, **settings)
@@ -137,18 +137,6 @@ class Group:
         return found
 
 
-class Shown(Protocol):
-    """What a command prints."""
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return it as JSON holds it."""
-        ...
-
-    def shown(self) -> Iterator[Any]:
-        """Yield tables and sentences."""
-        ...
-
-
 @dataclass(frozen=True)
 class Command:
     """A function with what the shell has to know besides its parameters.
@@ -160,7 +148,8 @@ class Command:
     function : callable
         The function, unchecked.
     report : callable, optional
-        Makes what is printed of the function's result and the arguments; by default the result itself is.
+        Makes what is printed of the function's result and the arguments, by default the result itself: its ``to_dict``
+        is the JSON, its ``shown`` yields tables and sentences.
     results : callable
         Returns the classes of what is printed, for the schema; by default those that the report returns, or the
         function.
@@ -184,7 +173,7 @@ class Command:
 
     name: str
     function: Callable[..., Any]
-    report: Callable[[Any, _Given], Shown] | None = None
+    report: Callable[[Any, _Given], Any] | None = None
     results: Callable[[], tuple[Any, ...]] = tuple
     doing: str | Callable[[_Given], str] = ""
     run: Callable[..., None] | None = None
@@ -228,14 +217,10 @@ class Command:
         parameters = {} if self.run is None else dict(inspect.signature(self.run).parameters)
         return {name: parameters[name] for name in marked(parameters, Option)}
 
-    @property
-    def writes(self) -> bool:
-        """Whether it can write files."""
-        return any(option.writes is not None for option in self.options.values())
-
     def names_files(self, kind: Any) -> bool:
         """Whether the files that were written are added to a result of this class, as it does not declare them."""
-        return self.writes and not (hasattr(kind, "keys") and "files" in {key.key for key in kind.keys().values()})
+        declared = hasattr(kind, "keys") and "files" in {key.key for key in kind.keys().values()}
+        return not declared and any(option.writes is not None for option in self.options.values())
 
     def check(self, given: _Given, also_read: _Given | None = None) -> None:
         """Refuse an unknown word, a number too small, and outputs that can't be written or would destroy an input."""
@@ -304,7 +289,7 @@ def command(name: str = "", **settings: Any) -> Any:
     """Return the decorator that makes a function a command; the settings are those of `Command`."""
 
     def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
-        results = functools.partial(_returned_results, settings.get("report") or function)
+        results = functools.partial(_returned_results, settings.get("report"), function)
         declared = Command(name or function.__name__, function, **{"results": results, **settings})
         signature = inspect.signature(function)
 
@@ -358,12 +343,19 @@ def choices_of(parameter: inspect.Parameter) -> tuple[Any, ...]:
     return next((get_args(one) for one in kinds if get_origin(one) is Literal), ())
 
 
-def _returned_results(function: Callable[..., Any]) -> tuple[type[Declared], ...]:
-    """Return the results that the return annotation of a function names, which its file may import for types only."""
-    names = re.findall(r"\w+", str(inspect.signature(function).return_annotation))
-    load, _, imported = declared_names(function.__module__)
-    kinds = [load(name) for name in names if name in imported]
-    return tuple(kind for kind in kinds if isinstance(kind, type) and issubclass(kind, Declared))
+def _returned_results(*functions: Callable[..., Any] | None) -> tuple[type[Declared], ...]:
+    """Return the results that the return annotation of the first function names that names any.
+
+    They stand in the file of the function, which may import them for types only.
+    """
+    for function in filter(None, functions):
+        names = re.findall(r"\w+", str(inspect.signature(function).return_annotation))
+        module = inspect.getmodule(function)
+        load, _, imported = declared_names(function.__module__)
+        kinds = [load(name) if name in imported else vars(module).get(name) for name in names]
+        if results := tuple(kind for kind in kinds if isinstance(kind, type) and issubclass(kind, Declared)):
+            return results
+    return ()
 
 
 def _plain_signature(signature: inspect.Signature, gives: Callable[[Any], Any] | None) -> inspect.Signature:

@@ -63,7 +63,8 @@ def write_help(command: Any, ctx: Any, formatter: Any) -> None:
         with formatter.indentation():
             formatter.write_text(paragraph)
     for title, rows in _sections(command, ctx).items():
-        _write_section(formatter, title, rows)
+        with formatter.section(title):
+            formatter.write_dl(rows, col_max=_FIRST_COLUMN if formatter.width >= _SHORT else _SHORT_FIRST_COLUMN)
     if hasattr(command, "format_commands"):
         command.format_commands(ctx, formatter)
     _write_examples(formatter, examples_of(command.help))
@@ -78,22 +79,12 @@ def _sections(command: Any, ctx: Any) -> dict[str, list[tuple[str, str]]]:
     for param in command.get_params(ctx):
         record = param.get_help_record(ctx)
         if record is not None:
-            name = _with_plain_types(record[0])
+            name = _TYPE.sub(lambda found: _PLAIN.get(found[1], ""), record[0]).replace("...", "").strip()
             record = (name.replace(" FILE", " FOLDER") if record[1].startswith("Folder") else name, record[1])
             argument = param.param_type_name == "argument"
             title = "Arguments" if argument else getattr(param, "rich_help_panel", None) or "Options"
             sections.setdefault(title, []).append(record)
     return {title: rows for title, rows in sections.items() if rows}
-
-
-def _with_plain_types(name: str) -> str:
-    """Return the name of a parameter with the kinds of its values in plain words."""
-    return _TYPE.sub(lambda found: _PLAIN.get(found[1], ""), name).replace("...", "").strip()
-
-
-def _write_section(formatter: Any, title: str, rows: list[tuple[str, str]]) -> None:
-    with formatter.section(title):
-        formatter.write_dl(rows, col_max=_FIRST_COLUMN if formatter.width >= _SHORT else _SHORT_FIRST_COLUMN)
 
 
 def _write_examples(formatter: Any, examples: list[tuple[str, str]]) -> None:

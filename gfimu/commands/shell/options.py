@@ -5,26 +5,35 @@ What is special to a command goes behind the common description or before it (`O
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
-from gfimu.base.files.outputs import RECORDING, RERUN
+from gfimu.base.files.outputs import RECORDING, RERUN, OutputFile
 from gfimu.commands.shell import completion
 from gfimu.commands.shell.declare import Group, Option
-from gfimu.commands.shell.output_files import PICTURE as PICTURE_FILE
 
 if TYPE_CHECKING:
     from gfimu.recording.importing import ColumnMap
 
 FOREIGN = "A file of another layout"
 
+
+def picture_file(*endings: str) -> OutputFile:
+    """Return the kind of output that is a picture with one of these endings."""
+    return OutputFile("a picture", endings, dict.fromkeys(endings, ("matplotlib",)), any_case=True)
+
+
+def _named(text: str, metavar: str, offers: Any, *, kind: Any = str, **settings: Any) -> Option:
+    """Return the option for a file that may be given by the name of one that comes with gfimu."""
+    return Option(text, metavar, offers=offers, kind=kind, reads=True, **settings)
+
+
+def file_argument(text: str, metavar: str, kind: Any = Path) -> Option:
+    """Return the option for a file that is read and named by position; several where the kind is a list."""
+    return Option(text, metavar, kind=kind, argument=True, reads=True)
+
+
 ALLOW_CODE = Option("Let a file run the Python code that it names: only a file that you trust.")
-ARRAY = Option(
-    "Array: a name, an array file (.toml) or an MJCF file with sites (.xml)",
-    "ARRAY",
-    offers=completion.arrays,
-    kind=str,
-    reads=True,
-)
+ARRAY = _named("Array: a name, an array file (.toml) or an MJCF file with sites (.xml)", "ARRAY", completion.arrays)
 BAUD = Option("Speed of the line, bits per second", "BAUD")
 BIAS_MG = Option("Bias of each channel, 1 σ, mg", "MG")
 BIAS_STD_M_S2 = Option("Standard deviation of each channel's bias, m/s²", "M/S²")
@@ -33,16 +42,11 @@ CALIBRATION = Option("Calibration to apply first (.json, from gfimu calibrate)."
 CHIPS = Option("Number of chips", "N")
 DATA = Option("Folder of the measured data, for the set real.", "DIR", reads=True)
 DURATION = Option("Length of the run, s", "S")
+ESTIMATE_OUT = Option("Estimate to write (.csv, .parquet)", writes=OutputFile("an estimate", (".csv", ".parquet")))
 FORCE = Option("Go on where the checks of units, time, array and channels refuse the file")
 GRAVITY = Option("Local gravity, m/s²", "M/S²")
 GYRO = Option("Fuse the gyro columns as well")
-IMAGE = Option(
-    "Image: gfimu, selfcheck, or an ELF or .bin file.",
-    "IMAGE",
-    kind=str,
-    offers=completion.words("gfimu", "selfcheck"),
-    reads=True,
-)
+IMAGE = _named("Image: gfimu, selfcheck, or an ELF or .bin file.", "IMAGE", ("gfimu", "selfcheck"))
 KEEP_FAULTY = Option("Use channels that contradict the others, too")
 LATITUDE = Option("Latitude, degrees", "DEG")
 LIMIT = Option("Only so many worlds of each set, which stand in random order.", "N", least=1)
@@ -50,70 +54,53 @@ MAX_MEMORY = Option(
     "Memory that reading a file may take, as 2GB; by default four times its size and 500 MB", "SIZE", kind=str
 )
 NOISE_UG = Option("White noise of each channel, one-sided density, µg/√Hz", "UG")
-PICTURE = Option("Picture to write (.png, .svg, .pdf)", "FILE", writes=PICTURE_FILE)
+PICTURE = Option("Picture to write (.png, .svg, .pdf)", "FILE", writes=picture_file(".png", ".svg", ".pdf"))
 PORT = Option("Port of the board", "PORT")
 PROGRESS = Option("Called with the share done, 0 to 1, and a line of text", shell=False)
 RANGE = Option("Range of the chips: ±2, 4, 8 or 16 g", "G")
 RATE = Option("Sample rate, Hz", "HZ")
-RECORDINGS = Option("Recordings of one rig: .csv, .parquet, .bin", "RUN...", kind=list[Path], argument=True, reads=True)
-RECORDING_OUT = Option("Recording to write (.csv, .parquet).", "FILE", writes=RECORDING, what="recording")
+RECORDINGS = file_argument("Recordings of one rig: .csv, .parquet, .bin", "RUN...", list[Path])
+RECORDING_OUT = Option("Recording to write (.csv, .parquet)", "FILE", writes=RECORDING, what="recording")
 REST_THRESHOLD = Option("Threshold of rest, reading unit squared; else from the data.", "UNIT²")
 RRD = Option("Rerun recording to write (.rrd)", "FILE", writes=RERUN)
-SCENARIO = Option(
-    "Scenario: a name, or a scenario file (.toml)", "SCENARIO", offers=completion.scenarios, kind=str, reads=True
-)
+SCENARIO = _named("Scenario: a name, or a scenario file (.toml)", "SCENARIO", completion.scenarios)
+SCHEMA_OUT = Option("JSON schema to write (.json)", "FILE", writes=OutputFile("a JSON schema", (".json",)))
 SEED = Option("Seed of everything left to chance", "N", least=0)
 SETS = Option(
     "Set of worlds; may be repeated. All that are drawn by default.",
     "SET",
     kind=list[str],
-    offers=completion.words("own", "independent", "unlisted", "dcmotor", "real"),
+    offers=("own", "independent", "unlisted", "dcmotor", "real"),
 )
 SHARE = Option("Called with the share done, 0 to 1.", shell=False)
 SPEED_RAD_S = Option("Angular rate, rad/s", "RAD/S")
-SPLIT = Option(
-    "Worlds to develop on (dev), or those of the published table (test).",
-    "SPLIT",
-    offers=completion.words("dev", "test"),
-)
+SPLIT = Option("Worlds to develop on (dev), or those of the published table (test).", "SPLIT")
 TABLE = Option("Table, topic or member of a file that holds several.", "NAME", panel=FOREIGN)
 TIME_LIMIT = Option("Real time to spend at most, s", "S")
-TWIN = Option(
-    "Twin, what the simulation assumes: a name, or a twin file (.toml).",
-    "TWIN",
-    offers=completion.twins,
-    kind=str,
-    reads=True,
-)
+TWIN = _named("Twin, what the simulation assumes: a name, or a twin file (.toml).", "TWIN", completion.twins)
 UNKNOWN_START = Option("The body may turn already when the run begins")
 WORKERS = Option("Processes to work in; by default one per processor", "N")
 
 
-ARRAYS = Option(
-    "Names, array files (.toml) or MJCF files (.xml); all shipped ones.",
-    "[ARRAY]...", kind=list[str], argument=True, offers=completion.arrays, reads=True,
+ARRAYS = _named(
+    "Names, array files (.toml) or MJCF files (.xml); all shipped ones.", "[ARRAY]...", completion.arrays,
+    kind=list[str], argument=True,
 )  # fmt: skip
 
 
+_MAP = _named("Column map: a name, or a TOML file (gfimu inspect writes one).", "MAP", completion.maps, name="--map")
+_MAP_SET = Option(
+    "Set a key of the column map, or with no --map all of it: time.column=t time.unit=ms unit=g channels.a11=ax "
+    "drop=corrupt,duplicates; may be repeated.",
+    "KEY=VALUE",
+)
+_REFERENCE_MAP = _named("Column map of the file of references.", "MAP", completion.maps)
+_REFERENCE_MAP_SET = Option("Set a key of the reference's column map; may be repeated.", "KEY=VALUE")
+
+
 def _map_from_options(
-    column_map: Annotated[
-        str | None,
-        Option(
-            "Column map: a name, or a TOML file (gfimu inspect writes one).",
-            "MAP",
-            name="--map",
-            offers=completion.maps,
-            reads=True,
-        ),
-    ] = None,
-    map_set: Annotated[
-        list[str],
-        Option(
-            "Set a key of the column map, or with no --map all of it: time.column=t time.unit=ms unit=g "
-            "channels.a11=ax drop=corrupt,duplicates; may be repeated.",
-            "KEY=VALUE",
-        ),
-    ] = (),  # type: ignore[assignment]
+    column_map: Annotated[str | None, _MAP] = None,
+    map_set: Annotated[list[str], _MAP_SET] = (),  # type: ignore[assignment]
     table: Annotated[str | None, TABLE] = None,
 ) -> "ColumnMap | None":
     """Return the map that the options of the shell say; None without any."""
@@ -140,12 +127,8 @@ MAP = replace(MAP_OF_TABLE, without=("table",))
 
 
 def _reference_map_from_options(
-    reference_map: Annotated[
-        str | None, Option("Column map of the file of references.", "MAP", offers=completion.maps, reads=True)
-    ] = None,
-    reference_map_set: Annotated[
-        list[str], Option("Set a key of the reference's column map; may be repeated.", "KEY=VALUE")
-    ] = (),  # type: ignore[assignment]
+    reference_map: Annotated[str | None, _REFERENCE_MAP] = None,
+    reference_map_set: Annotated[list[str], _REFERENCE_MAP_SET] = (),  # type: ignore[assignment]
 ) -> "ColumnMap | None":
     """Return the map of the references that the options of the shell say; None without any."""
     return _map_from_options(reference_map, reference_map_set)

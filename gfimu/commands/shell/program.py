@@ -9,13 +9,14 @@ import os
 import sys
 import tempfile
 import traceback
+import warnings
 from dataclasses import dataclass
+from typing import Any
 
 import typer
 
-from gfimu.base.errors import GfimuError, InputError, one_line, printable
+from gfimu.base.errors import GfimuError, GfimuWarning, InputError, one_line, printable
 from gfimu.base.version import __version__
-from gfimu.commands.shell import warning_lines
 from gfimu.commands.shell.command import CONTEXT
 from gfimu.commands.shell.command_group import JSON_ASKED, CommandGroup
 from gfimu.commands.shell.output import print_json
@@ -79,7 +80,23 @@ def _options(
     """Collect the options of the program itself."""
     if json:
         raise InputError("--json stands after the command, or beside --version")
-    warning_lines.install()
+    _warn_in_lines()
+
+
+def _warn_in_lines() -> None:
+    """Print each warning of gfimu once, as one line on standard error; others as Python does."""
+    printed: set[str] = set()
+
+    def show(message: Warning | str, category: type[Warning], *place: Any, **more: Any) -> None:
+        if not issubclass(category, GfimuWarning):
+            sys.stderr.write(printable(warnings.formatwarning(message, category, *place[:2])))
+        elif str(message) not in printed:
+            printed.add(str(message))
+            sys.stderr.write(f"gfimu: warning: {one_line(str(message))}\n")
+
+    warnings.simplefilter("ignore", RuntimeWarning)  # of numbers without end: what follows from them is refused
+    warnings.simplefilter("always", GfimuWarning)
+    warnings.showwarning = show
 
 
 def program() -> typer.Typer:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -11,7 +11,8 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.base.declared import Declared, figure
+from gfimu.base.declared import Declared, FileText, Line, figure
+from gfimu.base.declared import table as table_of
 from gfimu.base.errors import InputError, one_line
 from gfimu.base.results import TableResult, columns_of, text_column
 from gfimu.recording.importing.clock import Times, times_of
@@ -30,6 +31,7 @@ __all__ = ["ColumnView", "Inspection", "inspect_file"]
 
 
 _MOST_COLUMNS, _MOST_TABLES = 600, 200  # of a file whose layout is guessed
+_SHOWN_COLUMNS = 40  # numerical: rows of a table that people still read
 
 
 @dataclass(frozen=True)
@@ -49,7 +51,7 @@ class Inspection(Declared, TableResult):
     """What a file seems to hold: the proposed meaning of its columns, with the evidence for it.
 
     ``column_map`` is the map to start from, None if no accelerations were found; ``is_own`` whether it is a recording
-    of gfimu's, which needs no map.
+    of gfimu's, which needs no map; ``shows_map`` whether people see the map too.
 
     Examples
     --------
@@ -75,6 +77,7 @@ class Inspection(Declared, TableResult):
     reasons: Annotated[tuple[str, ...], figure("What the proposed map rests on, one line each.")] = ()
     column_map: ColumnMap | None = None
     is_own: bool = False
+    shows_map: bool = True
 
     @property
     def map_toml(
@@ -92,6 +95,25 @@ class Inspection(Declared, TableResult):
         rate = f", {self.sample_rate_hz:.5g} Hz" if math.isfinite(self.sample_rate_hz) else ""
         chips = f"{self.chips} chip{'' if self.chips == 1 else 's'}" if self.chips else "no accelerations found"
         return f"{self.source}: {self.format}, {self.rows} rows{rate}, {chips}"
+
+    def shown(self) -> Iterator[Any]:
+        """Yield the columns, the evidence for the map, and the map."""
+        if len(self.tables) > 1:
+            yield f"Tables: {'; '.join(self.tables)}. Shown: {self.table or 'the file'}."
+        more = len(self.columns) - _SHOWN_COLUMNS
+        note = f"and {more} further columns" if more > 0 else ""
+        columns = self.columns[:_SHOWN_COLUMNS]
+        yield table_of(self.summary, columns, "name role least median most missing", left=2, note=note)
+        yield from (f"- {line}" for line in self.reasons)
+        if self.findings:
+            yield Line("Odd:", style="bold")
+            yield from (f"- {line}" for line in self.findings)
+        if self.fitting:
+            maps = ", ".join(f"--map {name}" for name in self.fitting)
+            yield Line(f"Maps that come with gfimu and fit: {maps}", style="bold")
+        if self.shows_map and self.column_map is not None:
+            yield Line("A column map to start from (--out FILE.toml writes it):", style="bold")
+            yield FileText(f"{self.map_toml}\n")
 
     def to_columns(self) -> dict[str, NDArray[Any]]:
         """Return one row per column of the file: range, median, missing values, and what it seems to be."""

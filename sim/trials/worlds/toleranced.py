@@ -7,13 +7,16 @@ and sampling are ideal: they are no tolerances.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import InputError
 from gfimu.base.short_repr import short_repr
 from gfimu.budget.tolerances.calibrated import Poses
 from gfimu.budget.tolerances.known_motion import KnownMotion
@@ -30,13 +33,12 @@ from sim.truth import cube_state
 
 __all__ = [
     "CALIBRATED_AT",
-    "LEAST_TIME_S",
-    "REST_S",
     "ToleranceUnit",
     "calibration_poses",
     "draw_unit",
     "known_motion_of",
     "reference_motion",
+    "tolerated_run",
 ]
 
 Floats = NDArray[np.float64]
@@ -44,12 +46,12 @@ Floats = NDArray[np.float64]
 CALIBRATED_AT = 25.0
 """Temperature of the data sheets' figures and of a calibration, °C."""
 
-REST_S = 1.5
-"""Rest at the start of the reference motion, s."""
+_REST_S, _RAMP_S = 1.5, 0.5
+"""Rest at the start of the reference motion, and the ramp that follows it, s."""
 
-_RAMP_S = 0.5
-LEAST_TIME_S = REST_S + _RAMP_S
-"""Shortest reference motion: its rest and its ramp, s."""
+_LEAST_TIME_S = _REST_S + _RAMP_S
+_USUAL_TIME_S = 3.0  # of the reference motion: a second at the rate, after rest and ramp
+_MOST_SAMPLES = 6000  # numerical: memory of the first-order maps, 1 GB with 24 channels
 
 
 @dataclass(frozen=True)
@@ -140,14 +142,57 @@ def reference_motion(array: AccelerometerArray, *, time: float, rate: float, sam
     array : AccelerometerArray
         The array, its origin on the axis.
     time : float
-        Length, s, longer than `LEAST_TIME_S`.
+        Length, s, longer than rest and ramp.
     rate : float
         Rate that is held, rad/s.
     sample_rate : float
         Sample rate, Hz.
     """
-    pieces: list[Segment] = [Hold(REST_S), Ramp(rate, _RAMP_S), Hold(time - LEAST_TIME_S)]
+    pieces: list[Segment] = [Hold(_REST_S), Ramp(rate, _RAMP_S), Hold(time - _LEAST_TIME_S)]
     return Scenario("reference motion", array, spin_profile(pieces), time, sample_rate, cube_offset=(0.0, 0.0, 0.0))
+
+
+def tolerated_run(
+    array: AccelerometerArray, scenario: Scenario | str | Path | None, *, duration: float | None, rate: float
+) -> tuple[Scenario, str]:
+    """Return the run for which errors are budgeted, with nothing wrong in it, and what it is in words.
+
+    Parameters
+    ----------
+    array : AccelerometerArray
+        The nominal array.
+    scenario : Scenario, str or Path, optional
+        Scenario, its name or file, of which array, sensors and effects are not used; by default `reference_motion`.
+    duration : float, optional
+        Length, s; by default that of the scenario, or 3 s.
+    rate : float
+        Rate of the reference motion, rad/s.
+
+    Raises
+    ------
+    InputError
+        If duration or rate are out of range, or the run has too few or too many samples.
+    """
+    if scenario is None:
+        length = _USUAL_TIME_S if duration is None else duration
+        if not _LEAST_TIME_S < length < math.inf:
+            raise InputError(f"--duration {length:g}: the default motion is longer than {_LEAST_TIME_S:g} s; give more")
+        if not 0.0 < abs(rate) <= 1e3:
+            raise InputError(f"--speed-rad-s {rate:g}: give a rate of at most 1000 rad/s that is not zero")
+        run = reference_motion(array, time=length, rate=rate)
+        words = f"at rest for {_REST_S:g} s, then spun up to {rate:g} rad/s about the vertical, {length:g} s in all"
+    else:
+        chosen = scenario if isinstance(scenario, Scenario) else Scenario.load(scenario)
+        length = chosen.duration if duration is None else duration
+        if not 0.0 < length <= chosen.duration:
+            lasts = f"scenario {chosen.name!r} lasts {chosen.duration:g} s"
+            raise InputError(f"--duration {length:g}: {lasts}; give at most that")
+        run = replace(chosen, array=array, part=None, duration=length, driven=False, effects=(), earth=None)
+        words = f"scenario {chosen.name}, {length:g} s"
+    samples = run.duration * run.sample_rate
+    if not 10 <= round(samples) <= _MOST_SAMPLES:
+        raise InputError(f"the run has {samples:.0f} samples; give a --duration with 10 to {_MOST_SAMPLES}")
+    return run, words
 
 
 def calibration_poses(run: Scenario) -> tuple[Scenario, Poses]:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from gfimu.calibration.certificate.certificate import Component
+from gfimu.calibration.certificate.certificate import Certificate, Component
+from gfimu.calibration.certificate.certify import certify
 from gfimu.calibration.certificate.chip_parameters import chip_parameters
 from gfimu.calibration.certificate.quantities import stated_quantities
 from gfimu.calibration.certificate.stage.simulated_calibration import simulated_method
@@ -37,6 +39,12 @@ class StageComponents:
     components: tuple[Component, ...]
     misfit: float
     statements: tuple[str, ...]
+
+    def certify(self, calibration: Calibration, *, components: Iterable[Component] = (), **stated: Any) -> Certificate:
+        """Certify a calibration (`gfimu.calibration.certificate.certify`) with these components, and others."""
+        both = (*components, *self.components)
+        found = certify(calibration, components=both, explained_misfit=self.misfit, **stated)
+        return replace(found, statements=(*found.statements, *self.statements))
 
 
 def stage_components(

@@ -18,7 +18,7 @@ from gfimu.base.errors import GfimuError
 from gfimu.rate.first_call import must_compile
 from gfimu.rate.health.fault import ChannelFault, HealthCode
 from gfimu.rate.health.live.block import Health
-from gfimu.rate.health.live.channel_watch import HealthEvent, LiveWatch
+from gfimu.rate.health.live.channel_watch import HealthEvent
 from gfimu.rate.health.live.watched_filter import WatchedRateFilter
 from gfimu.rate.live import LiveRateFilter
 from gfimu.rate.result import RateEstimate
@@ -58,8 +58,7 @@ class BackgroundFilter:
 
     def __init__(self, array: AccelerometerArray, sample_rate: float) -> None:
         errors, period = SensorErrors.from_parts(array, sample_rate), 1.0 / sample_rate
-        watch = LiveWatch(array, errors.with_part_gains(array), period)  # raw counts: nothing is calibrated
-        self._filter = WatchedRateFilter(LiveRateFilter(array, errors, period), watch)
+        self._filter = WatchedRateFilter.of(LiveRateFilter(array, errors, period), errors)
         self.must_compile = must_compile()
         self._samples: queue.SimpleQueue[tuple[NDArray[Any], ...] | None] = queue.SimpleQueue()
         self._done: queue.SimpleQueue[Filtered] = queue.SimpleQueue()

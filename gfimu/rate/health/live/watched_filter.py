@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 from collections import deque
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +14,7 @@ from gfimu.rate.health.live.channel_watch import HealthEvent, LiveWatch
 from gfimu.rate.health.start import Settling
 from gfimu.rate.live import LiveRateFilter
 from gfimu.rate.result import ChannelReport, RateEstimate
+from gfimu.rate.sensing import SensorErrors
 
 __all__ = ["WatchedRateFilter"]
 
@@ -60,6 +61,12 @@ class WatchedRateFilter:
         self._events: list[HealthEvent] = []
         self._settling = Settling(live.period, watch.policy)
         self._ask_at = -np.inf
+
+    @classmethod
+    def of(cls, live: LiveRateFilter, errors: SensorErrors, *, calibrated: bool = False, at_rest: bool = True) -> Self:
+        """Return a filter with the watch for its sensors' errors, to which the gains of uncalibrated parts belong."""
+        stated = errors if calibrated else errors.with_part_gains(live.array)
+        return cls(live, LiveWatch(live.array, stated, live.period, at_rest=at_rest))
 
     @property
     def live(self) -> LiveRateFilter:
