@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from gfimu.diagnosis.data.time_grid import time_grid
     from gfimu.diagnosis.design.run_check import check_runs, turns_one_way
     from gfimu.diagnosis.diagnose import prepare
-    from gfimu.diagnosis.fit.gauss_newton import fit
     from gfimu.diagnosis.fit.learn import predicted_by_reference, starting_point
     from gfimu.diagnosis.one_library import stretches_of
     from gfimu.diagnosis.policy import Policy

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.diagnosis.data.stretch import Stretch
-from gfimu.diagnosis.fit.gauss_newton import FEW, Fit, fit
+from gfimu.diagnosis.fit.gauss_newton import FEW, fit
 from gfimu.diagnosis.fit.linear import Point, linearise
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.terms.cause import effects_of
@@ -47,13 +47,13 @@ class FreeTime:
     pattern: str
 
 
-def free_time(stretches: Sequence[Stretch], fitted: Fit, policy: Policy) -> list[FreeTime]:
-    """Return the places of errors that are free in time beside the causes of a fit, best first.
+def free_time(stretches: Sequence[Stretch], point: Point, policy: Policy) -> list[FreeTime]:
+    """Return the places of errors that are free in time beside the causes of a point, best first.
 
     The noise is the one to begin with, as learnt noise would take in what is looked for.
     """
     levels = tuple(stretch.first_levels for stretch in stretches)
-    point = fit(stretches, replace(fitted.point, levels=levels), replace(policy, steps=FEW)).point
+    point = fit(stretches, replace(point, levels=levels), replace(policy, steps=FEW)).point
     totals: dict[str, FreeTime] = {}
     for index, posterior in enumerate(linearise(stretches, point, responses=False).posteriors):
         stretch = stretches[index]

@@ -86,7 +86,7 @@ def localise(stretches: Sequence[Stretch], policy: Policy) -> Localised:
         rounds.append(tuple(Rival(leader, found.log_posterior - least) for leader, found in compared))
         present = compared[0][1]
         least = present.log_posterior
-    return Localised(tuple(stretches), present, tuple(rounds), tuple(free_time(stretches, present, policy)))
+    return Localised(tuple(stretches), present, tuple(rounds), tuple(free_time(stretches, present.point, policy)))
 
 
 def _compared(stretches: Sequence[Stretch], present: Fit, policy: Policy) -> list[tuple[Leader, Fit]]:

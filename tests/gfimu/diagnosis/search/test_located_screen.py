@@ -15,7 +15,6 @@ from gfimu.diagnosis import (
     Operator,
     Policy,
     Wave,
-    fit,
     free_time,
     prepare,
     signal_of,
@@ -29,22 +28,22 @@ TWIN = having(Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
 POLICY = Policy()
 
 
-def fitted(change):
-    """Stretches of a recording with something added to its readings, and their drive without a cause."""
+def started(change):
+    """Stretches of a recording with something added to its readings, and the drive that the reference gives."""
     recording = measure(np.random.default_rng(5), TWIN, [], Measurement(duration=20.0))
     recording = replace(recording, readings=recording.readings + change(recording.t_s))
     stretches = stretches_of(TWIN, prepare([recording], TWIN, ["run"]))
-    return stretches, fit(stretches, starting_point(stretches, POLICY.knots), POLICY)
+    return stretches, starting_point(stretches, POLICY.knots)
 
 
 @pytest.fixture(scope="module")
 def humming():
-    return fitted(lambda t: np.outer(0.05 * np.sin(2 * np.pi * 17.321 * t), np.eye(12)[7]))
+    return started(lambda t: np.outer(0.05 * np.sin(2 * np.pi * 17.321 * t), np.eye(12)[7]))
 
 
 def test_a_tone_is_found_on_its_channel_to_a_tenth_of_what_can_be_separated(humming):
-    stretches, found = humming
-    leaders = LocatedScreen(stretches, found.point, POLICY).leaders()
+    stretches, point = humming
+    leaders = LocatedScreen(stretches, point, POLICY).leaders()
     best = leaders[0].term
     assert (best.where.components, best.dependence.kind) == (("a32",), "tone")
     assert best.dependence.cycles == pytest.approx(17.321, abs=0.1 / 20.0)
@@ -54,14 +53,14 @@ def test_a_tone_is_found_on_its_channel_to_a_tenth_of_what_can_be_separated(humm
 
 
 def test_one_channel_of_twelve_and_a_wave_pay_for_having_been_chosen(humming):
-    stretches, found = humming
-    best = LocatedScreen(stretches, found.point, POLICY).leaders()[0]
+    stretches, point = humming
+    best = LocatedScreen(stretches, point, POLICY).leaders()[0]
     assert best.cause.log_prior == pytest.approx(POLICY.unnamed - LOCATED.wave_looks - np.log(12.0))
 
 
 def test_a_channel_that_jumps_is_the_place_of_an_error_that_is_free_in_time():
-    stretches, found = fitted(lambda t: np.outer(np.where((t > 6.0) & (t < 9.0), 0.2, 0.0), np.eye(12)[7]))
-    best, *_ = free_time(stretches, found, POLICY)
+    stretches, point = started(lambda t: np.outer(np.where((t > 6.0) & (t < 9.0), 0.2, 0.0), np.eye(12)[7]))
+    best, *_ = free_time(stretches, point, POLICY)
     assert (best.where.components, best.pattern) == (("a32",), "one")
     assert best.log_odds > POLICY.free_odds
 
