@@ -18,6 +18,7 @@ from typing import Annotated, Any, Protocol
 from numpy.typing import NDArray
 
 from firmware_bridge.adxl345.registers import TICKS_PER_SECOND
+from firmware_bridge.board.uart import FRAMING_ERROR
 from firmware_bridge.loop.board_process import BoardProcess
 from firmware_bridge.loop.line_speed import as_received, terminal_baud
 from gfimu.base.declared import Declared, Line, Table, figure, figures
@@ -32,7 +33,6 @@ _READ_BYTES = 4096
 _BUFFER_BYTES = 1 << 18
 _NOBODY_S = 1.0
 _PORTS = range(65536)
-_FRAMING_ERROR = 1 << 3  # of the UART's line status
 
 
 class VirtualPort(Protocol):
@@ -276,10 +276,8 @@ def serve(
     *,
     duration_s: float | None = None,
     realtime: bool = True,
-    stop: Callable[[], bool] | None = None,
-    on_progress: Callable[[float], None] | None = None,
 ) -> ServeReport:
-    """Run a board behind a port until the time is up, ``stop`` says so, or Ctrl-C.
+    """Run a board behind a port until the time is up, or Ctrl-C.
 
     A host that reads at another speed than the board sends gets garbage, as on a wire.
 
@@ -294,21 +292,13 @@ def serve(
     realtime : bool
         Keep pace with the clock on the wall: a host that reads late finds up to 256 KiB buffered, as a serial driver
         does, and what exceeds that, or nobody reads for a second, is lost. Otherwise run as fast as the host reads.
-    stop : callable, optional
-        Asked often; True ends the run.
-    on_progress : callable, optional
-        Receives the virtual time done, s.
     """
     began = time.monotonic()
     first = now = board.now
     received = 0
     end = None if duration_s is None else first + round(duration_s * TICKS_PER_SECOND)
     line = _Buffer(port)
-    with _ask_to_stop() as interrupted:
-
-        def over() -> bool:
-            return interrupted() or (stop is not None and stop())
-
+    with _ask_to_stop() as over:
         while (end is None or now < end) and not over():
             target = now + round((_SLICE_S if realtime else _FAST_SLICE_S) * TICKS_PER_SECOND)
             before = board.baud()
@@ -323,10 +313,8 @@ def serve(
             if asked:
                 ours = board.baud()
                 read, errors = as_received(asked, port.baud or ours, ours)
-                board.receive(read, _FRAMING_ERROR if errors else 0)
+                board.receive(read, FRAMING_ERROR if errors else 0)
                 received += len(asked)
-            if on_progress is not None:
-                on_progress((now - first) / TICKS_PER_SECOND)
             ahead = (now - first) / TICKS_PER_SECOND - (time.monotonic() - began)
             if realtime and ahead > 0:
                 time.sleep(ahead)

@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 
 from firmware_bridge import FORMATS
-from firmware_bridge.loop import board_process
+from gfimu.base.optional_packages import missing
 from gfimu.recording import Recording
 
-pytestmark = pytest.mark.skipif(not board_process.emulator_available(), reason="the emulator is in the extra")
+pytestmark = pytest.mark.skipif(missing("unicorn"), reason="the emulator is in the extra")
 GFIMU = Path(sys.executable).parent / "gfimu"
 
 

@@ -13,8 +13,9 @@ from firmware_bridge.loop import board_process
 from firmware_bridge.loop.fault_campaign import FAULTS, resample_line, run_fault
 from firmware_bridge.lpc1768.build import FOLDER
 from gfimu import InputError
+from gfimu.base.optional_packages import missing
 
-needs_board = pytest.mark.skipif(not board_process.emulator_available(), reason="the emulator is in the extra")
+needs_board = pytest.mark.skipif(missing("unicorn"), reason="the emulator is in the extra")
 
 
 @needs_board

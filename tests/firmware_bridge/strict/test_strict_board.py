@@ -17,8 +17,8 @@ from firmware_bridge.lpc1768.elf import Segment
 from firmware_bridge.strict import rules
 from firmware_bridge.strict.board import STUCK
 from firmware_bridge.strict.check import CheckOptions, check_image
-from firmware_bridge.strict.image import load_image
 from firmware_bridge.strict.findings import Rule
+from firmware_bridge.strict.image import load_image
 from firmware_bridge.strict.watch import Policy
 from firmware_bridge.strict.worker import run_board
 from gfimu import InputError
