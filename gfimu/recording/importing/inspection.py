@@ -131,7 +131,7 @@ def inspect_file(path: str | Path | ArrowStream, *, table: str = "") -> Inspecti
     own = own_chips(list(plain.columns))
     if own:
         return _own_recording(raw, plain, own)
-    found = suggest(raw, table=table, name=_map_name(raw.source))
+    found = suggest(raw, table=table, name=Path(raw.source).name.partition(".")[0] or "map")
     fitting = tuple(fitting_maps(raw))
     suggested, reasons = found.column_map, found.reasons
     time, is_rate_known, roles = found.time.spec, found.time.is_rate_known, found.roles
@@ -196,10 +196,6 @@ def _is_reference(name: str) -> bool:
 
 def _rate(times: Times | None) -> float:
     return 1.0 / float(np.median(np.diff(times.t_s))) if times is not None and len(times.t_s) > 1 else float("nan")
-
-
-def _map_name(source: str) -> str:
-    return Path(source).name.partition(".")[0] or "map"
 
 
 def _view(table: RawTable, name: str, role: str) -> ColumnView:
