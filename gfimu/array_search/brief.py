@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from gfimu.array.array import AccelerometerArray
 from gfimu.array_search.objectives import Conditions
-from gfimu.array_search.problem import Problem, Sites, Tolerance
+from gfimu.array_search.problem import Problem, Sites, ToleranceTable
 from gfimu.array_search.shapes import Shape, box, cylinder, sphere
 from gfimu.base.errors import InputError
 from gfimu.base.files.input_file import check_input
@@ -25,7 +25,6 @@ __all__ = [
     "BriefFile",
     "ObjectiveTable",
     "SitesTable",
-    "ToleranceTable",
     "load_brief",
     "problem_of",
     "sites_of_array",
@@ -115,16 +114,6 @@ class ObjectiveTable(Table, frozen=True):
     sample_rate_hz: Annotated[Positive, about("Sample rate, for noise, faults and drift.", "Hz")] = 100.0
 
 
-class ToleranceTable(Table, frozen=True):
-    """Machining and mounting: each chip is off by up to this, uniformly distributed."""
-
-    position_m: Annotated[NotNegative, about("Of each coordinate of each chip.", "m")] = 0.0
-    angle_rad: Annotated[NotNegative, about("Of the turn of each chip about each body axis.", "rad")] = 0.0
-    draws: Annotated[
-        int, about("Drawn arrays of which the worst counts, the same for every design.", ge=1, le=1000)
-    ] = 32
-
-
 class BriefFile(Table, frozen=True):
     """What array is wanted: chips, where they may sit and point, and what is to be small."""
 
@@ -192,7 +181,6 @@ def problem_of(brief: BriefFile, sites: Sites | None = None) -> tuple[Problem, C
         volume = Sites(volume.positions, (), volume.name)
     named = {"free": None, "site": None, "body": np.eye(3)}
     chosen = named[brief.directions] if isinstance(brief.directions, str) else np.array(brief.directions, dtype=float)
-    allowed = brief.tolerance
     problem = Problem(
         brief.chips,
         brief.axes_per_chip,
@@ -201,7 +189,7 @@ def problem_of(brief: BriefFile, sites: Sites | None = None) -> tuple[Problem, C
         brief.min_spacing_m,
         chosen,
         brief.non_recursive,
-        None if allowed is None else Tolerance(allowed.position_m, allowed.angle_rad, allowed.draws),
+        brief.tolerance,
         wanted.length_unit_m,
     )
     conditions = Conditions(

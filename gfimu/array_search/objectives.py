@@ -68,14 +68,6 @@ class Conditions:
     fault_time_s: float = 1.0
     sample_rate_hz: float = 100.0
 
-    def __post_init__(self) -> None:
-        for name in ("speed_rad_s", "time_s", "fault_time_s", "sample_rate_hz"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0):
-                raise InputError(f"{name} = {value!r}: must be a positive number")
-        if self.spin_axis not in {"x", "y", "z", "any"}:
-            raise InputError(f"unknown spin axis {self.spin_axis!r}; valid: x, y, z, any")
-
     @property
     def noise(self) -> float:
         """White noise of a channel per sample, m/s²."""
