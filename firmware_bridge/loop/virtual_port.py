@@ -276,8 +276,9 @@ def serve(
     *,
     duration_s: float | None = None,
     realtime: bool = True,
+    stop: Callable[[], bool] = lambda: False,
 ) -> ServeReport:
-    """Run a board behind a port until the time is up, or Ctrl-C.
+    """Run a board behind a port until the time is up, ``stop`` says so, or Ctrl-C.
 
     A host that reads at another speed than the board sends gets garbage, as on a wire.
 
@@ -292,20 +293,22 @@ def serve(
     realtime : bool
         Keep pace with the clock on the wall: a host that reads late finds up to 256 KiB buffered, as a serial driver
         does, and what exceeds that, or nobody reads for a second, is lost. Otherwise run as fast as the host reads.
+    stop : callable
+        Asked often; True ends the run.
     """
     began = time.monotonic()
     first = now = board.now
     received = 0
     end = None if duration_s is None else first + round(duration_s * TICKS_PER_SECOND)
     line = _Buffer(port)
-    with _ask_to_stop() as over:
-        while (end is None or now < end) and not over():
+    with _ask_to_stop() as interrupted:
+        while (end is None or now < end) and not interrupted() and not stop():
             target = now + round((_SLICE_S if realtime else _FAST_SLICE_S) * TICKS_PER_SECOND)
             before = board.baud()
             now = board.run_until(target if end is None else min(target, end))
             line.put(as_received(board.take_sent()[0], before, port.baud or before)[0])
             line.pass_on(0.0 if realtime else _SLICE_S)
-            while not realtime and line.waiting and not over():
+            while not realtime and line.waiting and not interrupted() and not stop():
                 line.pass_on(_SLICE_S)
             if realtime:
                 line.forget()
