@@ -16,12 +16,12 @@ from sim import (
     Tumble,
     drive,
     forward,
+    free_spec,
     prescribed_readings,
     spin_profile,
     turntable_model,
 )
 from sim.effects import make_effect
-from sim.rigs.rig_model import free_spec
 from sim.truth import cube_state
 from sim.world import Nod, World
 
