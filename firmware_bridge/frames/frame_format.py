@@ -23,15 +23,7 @@ from gfimu.array.array import AccelerometerArray
 from gfimu.array.parts.part import Part
 from gfimu.base.errors import InputError
 
-__all__ = [
-    "FORMATS",
-    "LPC1768_DTYPE",
-    "MIMU4444_DTYPE",
-    "FrameFormat",
-    "Status",
-    "TemperatureField",
-    "encode_samples",
-]
+__all__ = ["FORMATS", "LPC1768_DTYPE", "FrameFormat", "Status", "TemperatureField", "encode_samples"]
 
 FRAME_VERSION = 1
 

@@ -23,10 +23,8 @@ from gfimu.base.optional_packages import require
 from gfimu.base.results import TableResult, one_row
 
 __all__ = [
-    "ARRAY_SYMBOL",
     "IMAGES",
     "BuildReport",
-    "array_definition",
     "build",
     "check_image",
     "compiler_version",

@@ -20,16 +20,7 @@ from gfimu.base.files.input_file import check_input
 from gfimu.base.files.model_files import read_toml
 from gfimu.base.files.schema import NotNegative, Positive, Table, Triple, about, read
 
-__all__ = [
-    "BoxTable",
-    "BriefFile",
-    "ObjectiveTable",
-    "SitesTable",
-    "load_brief",
-    "problem_of",
-    "sites_of_array",
-    "sites_of_csv",
-]
+__all__ = ["BoxTable", "BriefFile", "SitesTable", "load_brief", "problem_of", "sites_of_array", "sites_of_csv"]
 
 _Centre = Annotated[Triple, about("Centre, body frame.", "m")]
 _Edges = Annotated[Triple, about("Edges along body x, y, z; zero makes it flat.", "m", example=[0.1, 0.1, 0.05])]

@@ -31,15 +31,7 @@ from gfimu.base.compiled import compiled
 from gfimu.base.declared import Declared, figure
 from gfimu.base.short_repr import short_repr
 
-__all__ = [
-    "Disagreement",
-    "DisagreementPolicy",
-    "MeasuredNoise",
-    "ScaleSoFar",
-    "lasting_scale",
-    "measured_scale",
-    "sum_up_disagreement",
-]
+__all__ = ["Disagreement", "MeasuredNoise", "ScaleSoFar", "lasting_scale", "measured_scale", "sum_up_disagreement"]
 
 
 _MEMORIES = 8.0  # numerical: of the longer memory, beyond which samples count for nothing

@@ -14,17 +14,7 @@ from sim.motions.motion import BodyMotion, SpinMotion
 from sim.motions.pose_sequence import PoseSequence
 from sim.motions.profiles import Chirp, Hold, Ramp, Segment, Sine, Tumble, spin_profile
 
-__all__ = [
-    "CarriageTable",
-    "HandTable",
-    "MotionTable",
-    "PosesTable",
-    "ProfileTable",
-    "RestTable",
-    "SegmentTable",
-    "TumbleTable",
-    "WheelTable",
-]
+__all__ = ["MotionTable", "ProfileTable"]
 
 _Duration = Annotated[Positive, about("Length.", "s", example=1.0)]
 _Amplitude = Annotated[float, about("Amplitude of the rate.", "rad/s", example=1.0)]

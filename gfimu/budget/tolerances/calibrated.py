@@ -31,7 +31,6 @@ from gfimu.recording import Recording
 
 __all__ = [
     "CALIBRATIONS",
-    "LEAST_REST_S",
     "Poses",
     "Remaining",
     "calibrations_of",
