@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.array.array import AccelerometerArray
-from gfimu.array_search.objectives import Conditions
+from gfimu.array_search.objectives import Conditions, ObjectiveTable
 from gfimu.array_search.problem import Problem, Sites, ToleranceTable
 from gfimu.array_search.shapes import Shape, box, cylinder, sphere
 from gfimu.base.errors import InputError
@@ -76,33 +76,6 @@ class SitesTable(Table, frozen=True, tag_field="kind", tag="sites"):
         ),
     ]
     names: Annotated[str, about("Of an MJCF file: pattern of the names of the sites, such as mount_*.")] = "*"
-
-
-class ObjectiveTable(Table, frozen=True):
-    """What is to be small, and under which conditions."""
-
-    name: Annotated[
-        str,
-        about(
-            "gdop, gdop_joint, kappa, sigma_alpha, sigma_p, rate, drift or fault; with _worst at the end, the largest "
-            "over the tolerances."
-        ),
-    ] = "gdop"
-    length_unit_m: Annotated[
-        Positive | None,
-        about("Length that counts as 1 in GDOP and κ.", "m", default="half the longest edge around the volume"),
-    ] = None
-    noise_m_s2: Annotated[
-        Positive | None, about("White noise of a channel per sample.", "m/s²", default="the part's at sample_rate_hz")
-    ] = None
-    bias_m_s2: Annotated[
-        NotNegative | None, about("Bias of a channel, for drift.", "m/s²", default="the part's at switch-on")
-    ] = None
-    speed_rad_s: Annotated[Positive, about("Speed at which the bound of the rate error is taken.", "rad/s")] = math.tau
-    spin_axis: Annotated[Literal["x", "y", "z", "any"], about("Body axis of that spin; any: the three alike.")] = "z"
-    time_s: Annotated[Positive, about("Time after which drift counts.", "s")] = 30.0
-    fault_time_s: Annotated[Positive, about("Time within which a fault of a channel is to be found.", "s")] = 1.0
-    sample_rate_hz: Annotated[Positive, about("Sample rate, for noise, faults and drift.", "Hz")] = 100.0
 
 
 class BriefFile(Table, frozen=True):
@@ -183,17 +156,7 @@ def problem_of(brief: BriefFile, sites: Sites | None = None) -> tuple[Problem, C
         brief.tolerance,
         wanted.length_unit_m,
     )
-    conditions = Conditions(
-        brief.part,
-        wanted.noise_m_s2,
-        wanted.bias_m_s2,
-        wanted.speed_rad_s,
-        wanted.spin_axis,
-        wanted.time_s,
-        wanted.fault_time_s,
-        wanted.sample_rate_hz,
-    )
-    return problem, conditions
+    return problem, Conditions(**msgspec.structs.asdict(wanted), part=brief.part)
 
 
 def sites_of_array(array: AccelerometerArray, name: str) -> Sites:
