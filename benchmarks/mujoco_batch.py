@@ -19,7 +19,7 @@ from dataclasses import replace  # noqa: E402
 import mujoco  # noqa: E402
 import numpy as np  # noqa: E402
 
-from sim.rigs.dc_motor import MotorTable  # noqa: E402
+from sim.rigs.dc_motor import DcMotor  # noqa: E402
 from sim.rigs.driven import Drive, drive_all  # noqa: E402
 from sim.scenarios import Scenario  # noqa: E402
 from sim.simulation import simulate  # noqa: E402
@@ -29,7 +29,7 @@ ROUNDS = 5
 
 def main(runs: int, seconds: float) -> None:
     """Print the rates of every way, for both drives."""
-    for name, motor in (("speed controller, Runge-Kutta", None), ("dcmotor, Euler", MotorTable())):
+    for name, motor in (("speed controller, Runge-Kutta", None), ("dcmotor, Euler", DcMotor())):
         scenario = replace(Scenario.load("driven_run"), duration=seconds, motor=motor)
         drives = [
             Drive(scenario.world.changed(gravity=9.8 + 1e-3 * number), scenario.motion, seconds, motor=motor)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from sim.motions.motion import BodyState, SpinState, SplineSpin
     from sim.motions.pose_sequence import POSE_SETS, PoseSequence
     from sim.motions.profiles import Chirp, Hold, Ramp, Sine, Tumble, paper_run, speed_sweep, spin_profile
-    from sim.rigs.dc_motor import MotorTable
+    from sim.rigs.dc_motor import DcMotor
     from sim.rigs.driven import Drive, drive, drive_all
     from sim.rigs.mjcf_array import array_from_mjcf
     from sim.rigs.rig_model import channel_places, free_spec, turntable_model

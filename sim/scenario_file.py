@@ -20,7 +20,8 @@ from sim.chips.adxl345 import SensorSettings
 from sim.chips.data_sheet import DataSheet
 from sim.effect_table import EffectTable
 from sim.motions.motion_file import MotionTable, ProfileTable
-from sim.rigs.dc_motor import MotorTable
+from sim.rigs.dc_motor import DcMotor
+from sim.rigs.motor_file import MotorTable
 from sim.twin_file import Inclination
 
 __all__ = ["ReferenceTable", "ScenarioFile", "scenario_fields"]
@@ -234,19 +235,16 @@ def scenario_fields(data: Mapping[str, Any], source: str, beside: Path | None) -
     }
 
 
-def _motor(drive: DriveTable, source: str) -> MotorTable | None:
+def _motor(drive: DriveTable, source: str) -> DcMotor | None:
     """Return the motor of a drive; None where it has none."""
-    if drive.mode != "dcmotor":
-        if drive.motor is None:
-            return None
+    if drive.mode == "dcmotor":
+        try:
+            return DcMotor() if drive.motor is None else drive.motor.motor()
+        except InputError as error:
+            raise InputError(f"{source}: {error}") from None
+    if drive.motor is not None:
         raise InputError(f"{source}: [drive.motor] belongs to drive.mode = 'dcmotor'; set that, or leave the motor out")
-    motor = drive.motor or MotorTable()
-    if motor.static_Nm < motor.coulomb_Nm:
-        raise InputError(
-            f"{source}: motor: static friction {motor.static_Nm:g} N·m is below the sliding one of "
-            f"{motor.coulomb_Nm:g} N·m; give static_Nm at least coulomb_Nm"
-        )
-    return motor
+    return None
 
 
 def _gravity(file: ScenarioFile) -> float:

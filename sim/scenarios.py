@@ -20,7 +20,7 @@ from sim.effects import NOT_OF_A_CARRIAGE, Effect, apply_effects
 from sim.effects.unlisted import Unlisted
 from sim.motions.carried import Carriage
 from sim.motions.motion import BodyMotion, BodyState, SpinMotion
-from sim.rigs.dc_motor import MotorTable
+from sim.rigs.dc_motor import DcMotor
 from sim.scenario_file import ReferenceTable, scenario_fields
 from sim.world import World
 
@@ -61,7 +61,7 @@ class Scenario:
         Angle between the table's axis and the vertical, rad, about the world's x axis: π/2 of a wheel or a pendulum.
     driven : bool
         Whether the motor drives the table after the command; otherwise the motion is prescribed.
-    motor : MotorTable, optional
+    motor : DcMotor, optional
         The motor of a driven table; by default a speed controller with limited torque.
     physics_step : float
         Step of the driven simulation, s.
@@ -96,7 +96,7 @@ class Scenario:
     mounting_rotvec: tuple[float, float, float] = (0.0, 0.0, 0.0)
     axis_inclination: float = 0.0
     driven: bool = False
-    motor: MotorTable | None = None
+    motor: DcMotor | None = None
     physics_step: float = 1e-3
     reference: ReferenceTable = field(default_factory=ReferenceTable)
     effects: tuple[Effect, ...] = ()

@@ -14,7 +14,6 @@ import matplotlib as mpl
 mpl.use("Agg")
 
 import matplotlib.pyplot as plt
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -33,7 +32,7 @@ def main(folder: Path) -> Path:
     scenario = Scenario.load("motor_run")
     assert scenario.motor is not None
     run = _driven(scenario)
-    smooth = _driven(replace(scenario, motor=msgspec.structs.replace(scenario.motor, damping_Nms_rad=1.0)))
+    smooth = _driven(replace(scenario, motor=replace(scenario.motor, damping=1.0)))
     figure, (crawl, ripple) = plt.subplots(1, 2, figsize=(7, 2.6), layout="constrained", width_ratios=[3, 2])
     shown = (run.t > CRAWL[0]) & (run.t < CRAWL[1])
     crawl.plot(run.t[shown], run.state.rate[shown], color=ORANGE, label="damping 0.1 N·m·s/rad")

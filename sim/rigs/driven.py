@@ -21,7 +21,7 @@ from gfimu.base.errors import InputError
 from gfimu.base.short_repr import short_repr
 from gfimu.model import world_model
 from sim.motions.motion import SpinMotion, SpinState, SplineSpin
-from sim.rigs.dc_motor import MOTOR_FILE, MotorTable
+from sim.rigs.dc_motor import MOTOR_FILE, DcMotor
 from sim.rigs.mujoco_warnings import mujoco_warnings
 from sim.rigs.rig_model import SPIN_JOINT, channel_places, turntable_spec
 from sim.world import Nod, World
@@ -51,9 +51,9 @@ class Drive:
         Length of the run, s.
     step : float
         Physics step, s.
-    motor : MotorTable, optional
+    motor : DcMotor, optional
         The motor; by default the speed controller of ``turntable.xml`` (proportional and integral, limited torque, dry
-        and viscous friction), stepped by a Runge-Kutta method of fourth order. A `MotorTable` is stepped by Euler's.
+        and viscous friction), stepped by a Runge-Kutta method of fourth order. A `DcMotor` is stepped by Euler's.
 
     Raises
     ------
@@ -65,7 +65,7 @@ class Drive:
     command: SpinMotion
     duration: float
     step: float = LONGEST_STEP
-    motor: MotorTable | None = None
+    motor: DcMotor | None = None
 
     __repr__ = short_repr
 
@@ -112,7 +112,7 @@ class Drive:
         if self.motor is None:
             return np.column_stack([wanted.rate, wanted.rate])
         if self.motor.control == "voltage":
-            return np.asarray(self.motor.constant_Nm_A * wanted.rate[:, None])
+            return np.asarray(self.motor.constant * wanted.rate[:, None])
         return np.column_stack([wanted.angle, wanted.rate])
 
 
@@ -178,7 +178,7 @@ def drive(
     duration: float,
     *,
     step: float = LONGEST_STEP,
-    motor: MotorTable | None = None,
+    motor: DcMotor | None = None,
 ) -> DrivenRun:
     """Drive the table with its motor after a commanded motion, against inertia and friction.
 

@@ -14,7 +14,7 @@ from gfimu.array.array import AccelerometerArray
 from gfimu.base.units import MILLI_G
 from sim.effects import Effect, make_effect
 from sim.motions.motion import SpinMotion, SplineSpin
-from sim.rigs.dc_motor import MotorTable
+from sim.rigs.dc_motor import DcMotor
 from sim.rigs.driven import drive
 from sim.trials.benchmark.generators import foreign_effects, foreign_world, independent_profiles
 from sim.trials.benchmark.generators import independent_effects as table_effects
@@ -109,13 +109,13 @@ def _motion(rng: np.random.Generator, case: Case, twin: Twin, duration: float) -
     if case.generator != "dcmotor":
         return random_profile(rng, duration)
     command = _Later(random_profile(rng, duration + 2 * _LEAD, top_rate=_TOP_ON_MOTOR), 0.0)
-    motor = MotorTable(
-        cogging_Nm=float(rng.uniform(0.002, 0.01)),
+    motor = DcMotor(
+        cogging=float(rng.uniform(0.002, 0.01)),
         cogging_periods=int(rng.choice([12, 24, 36])),
-        cogging_phase_rad=float(rng.uniform(-np.pi, np.pi)),
-        coulomb_Nm=(coulomb := float(rng.uniform(0.01, 0.03))),
-        static_Nm=1.4 * coulomb,
-        stiffness_Nm_rad=float(rng.uniform(4.0, 10.0)),
+        cogging_phase=float(rng.uniform(-np.pi, np.pi)),
+        coulomb=(coulomb := float(rng.uniform(0.01, 0.03))),
+        static=1.4 * coulomb,
+        stiffness=float(rng.uniform(4.0, 10.0)),
     )
     run = drive(twin.world(), command, duration + 2 * _LEAD, step=_MOTOR_STEP, motor=motor)
     return _Later(run.motion, _LEAD)

@@ -1,23 +1,22 @@
 """The table on MuJoCo's dcmotor against the motor's equations, worked out here."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
 import pytest
-from msgspec.structs import replace
 from scipy.integrate import quad
 
 from gfimu import AccelerometerArray, InputError
 from gfimu.base import find_model
-from sim import Drive, Hold, MotorTable, Ramp, SpinState, drive, forward, spin_profile
+from sim import DcMotor, Drive, Hold, Ramp, SpinState, drive, forward, spin_profile
 from sim.scenarios import Scenario
 from sim.world import World
 
-MOTOR = MotorTable()
-SMOOTH = replace(MOTOR, cogging_Nm=0.0)
-ALONE = replace(SMOOTH, bristle_stiffness_Nm_rad=0.0, viscous_Nms_rad=0.0, inductance_H=0.0)  # winding and inertia only
-BACK_EMF = MOTOR.constant_Nm_A**2 / MOTOR.resistance_ohm  # N·m·s/rad
+MOTOR = DcMotor()
+SMOOTH = replace(MOTOR, cogging=0.0)
+ALONE = replace(SMOOTH, bristle_stiffness=0.0, viscous=0.0, inductance=0.0)  # winding and inertia only
+BACK_EMF = MOTOR.constant**2 / MOTOR.resistance  # N·m·s/rad
 
 
 @dataclass(frozen=True)
@@ -55,13 +54,13 @@ def inertia(world):
     processor = box(board * 0.027 * 0.013 * 0.0008, 0.027, 0.013)
     corner = 0.05 * np.sqrt(2)
     chips = 4 * (box(board * 0.005 * 0.005 * 0.0008, 0.005, 0.005, corner) + box(3e-5, 0.0015, 0.0025, corner))
-    return shaft + disc + adapter + lids + walls + processor + chips + MOTOR.rotor_inertia_kgm2
+    return shaft + disc + adapter + lids + walls + processor + chips + MOTOR.rotor_inertia
 
 
 def friction(motor, rate):
     """Stribeck curve of the LuGre model in steady sliding, N·m."""
-    sliding = motor.coulomb_Nm + (motor.static_Nm - motor.coulomb_Nm) * np.exp(-((rate / motor.stribeck_rad_s) ** 2))
-    return sliding + motor.viscous_Nms_rad * rate
+    sliding = motor.coulomb + (motor.static - motor.coulomb) * np.exp(-((rate / motor.stribeck_rate) ** 2))
+    return sliding + motor.viscous * rate
 
 
 def test_the_shipped_model_has_the_default_figures(world):
@@ -83,13 +82,11 @@ def test_the_shipped_model_has_the_default_figures(world):
 def test_steady_speed_is_where_voltage_and_torque_balance(world, voltage):
     """V = R i + K ω and K i = friction(ω)."""
     motor = replace(SMOOTH, control="voltage")
-    run = drive(world, Steady(voltage / motor.constant_Nm_A), 25.0, motor=motor)
+    run = drive(world, Steady(voltage / motor.constant), 25.0, motor=motor)
     rate = run.state.rate[-1]
-    current = (voltage - motor.constant_Nm_A * rate) / motor.resistance_ohm
-    assert motor.constant_Nm_A * current == pytest.approx(friction(motor, rate), rel=1e-6)
-    assert rate == pytest.approx(
-        (MOTOR.constant_Nm_A * voltage / MOTOR.resistance_ohm - 0.02) / (BACK_EMF + 0.002), rel=1e-6
-    )
+    current = (voltage - motor.constant * rate) / motor.resistance
+    assert motor.constant * current == pytest.approx(friction(motor, rate), rel=1e-6)
+    assert rate == pytest.approx((MOTOR.constant * voltage / MOTOR.resistance - 0.02) / (BACK_EMF + 0.002), rel=1e-6)
 
 
 def test_spin_up_has_the_mechanical_time_constant(world, inertia):
@@ -110,7 +107,7 @@ def test_spin_up_has_the_mechanical_time_constant(world, inertia):
 @pytest.mark.parametrize("periods", [7, 24])
 def test_cogging_shows_at_its_order_of_the_shaft_angle(world, inertia, periods):
     """J dω/dt = A sin Nθ − (K²/R) δω: δω has the amplitude A/√((J N ω)² + (K²/R)²), and only the order N."""
-    motor = replace(ALONE, control="voltage", cogging_Nm=0.005, cogging_periods=periods)
+    motor = replace(ALONE, control="voltage", cogging=0.005, cogging_periods=periods)
     run = drive(world, Steady(4.0), 25.0, step=2e-4, motor=motor)
     turns = np.floor((run.state.angle[-1] - 60.0) / (2 * np.pi))
     angle = 60.0 + 2 * np.pi * np.arange(0, turns, 1 / 256)
@@ -126,14 +123,14 @@ def test_cogging_shows_at_its_order_of_the_shaft_angle(world, inertia, periods):
 
 def test_coasting_ends_where_friction_has_taken_the_energy(world, inertia):
     """Without gains the servo gives no torque: ½ J ω₀² = ∫ friction dθ, and the time to rest is ∫ J dω/friction."""
-    motor = replace(SMOOTH, stiffness_Nm_rad=0.0, damping_Nms_rad=0.0)
+    motor = replace(SMOOTH, stiffness=0.0, damping=0.0)
     run = drive(world, Steady(3.0), 8.0, step=2e-4, motor=motor)
     rest = run.t[np.argmax(np.abs(run.state.rate) < 1e-3)]
     assert rest == pytest.approx(quad(lambda rate: inertia / friction(motor, rate), 1e-3, 3.0)[0], rel=2e-3)
     angle = run.state.angle[np.argmax(np.abs(run.state.rate) < 1e-3)]
     assert angle == pytest.approx(quad(lambda rate: inertia * rate / friction(motor, rate), 1e-3, 3.0)[0], rel=2e-3)
     # At rest it is held: what is left is the spring of the bristles, σ₀, with the inertia.
-    assert np.ptp(run.state.angle[run.t > rest + 0.5]) < 2 * motor.static_Nm / motor.bristle_stiffness_Nm_rad
+    assert np.ptp(run.state.angle[run.t > rest + 0.5]) < 2 * motor.static / motor.bristle_stiffness
 
 
 def test_the_table_breaks_away_at_the_static_torque(world):
@@ -142,18 +139,18 @@ def test_the_table_breaks_away_at_the_static_torque(world):
     top = 0.04  # N·m at the end of 20 s
     run = drive(world, spin_profile([Ramp(top / BACK_EMF, 20.0)]), 20.0, step=5e-4, motor=motor)
     applied = BACK_EMF * spin_profile([Ramp(top / BACK_EMF, 20.0)]).at(run.t).rate
-    leaves = np.argmax(run.state.angle > 10 * motor.static_Nm / motor.bristle_stiffness_Nm_rad)
-    assert applied[leaves] == pytest.approx(motor.static_Nm, rel=0.05)
+    leaves = np.argmax(run.state.angle > 10 * motor.static / motor.bristle_stiffness)
+    assert applied[leaves] == pytest.approx(motor.static, rel=0.05)
 
 
 @pytest.mark.parametrize(("damping", "sticks"), [(0.11, True), (0.16, False)])
 def test_a_slow_servo_sticks_and_slips_where_friction_falls_faster_than_its_damping(world, damping, sticks):
     """Sliding at ω is unstable where 2(τ_s − τ_c) ω/ω_s² exp(−(ω/ω_s)²) exceeds the damping: 0.136 at 0.02 rad/s."""
-    rate, motor = 0.02, replace(SMOOTH, stiffness_Nm_rad=2.0, viscous_Nms_rad=0.0)
-    ratio = rate / motor.stribeck_rad_s
-    slope = 2 * (motor.static_Nm - motor.coulomb_Nm) * ratio / motor.stribeck_rad_s * np.exp(-(ratio**2))
+    rate, motor = 0.02, replace(SMOOTH, stiffness=2.0, viscous=0.0)
+    ratio = rate / motor.stribeck_rate
+    slope = 2 * (motor.static - motor.coulomb) * ratio / motor.stribeck_rate * np.exp(-(ratio**2))
     assert (damping < slope) == sticks
-    run = drive(world, spin_profile([Ramp(rate, 0.2), Hold(40.0)]), 40.0, motor=replace(motor, damping_Nms_rad=damping))
+    run = drive(world, spin_profile([Ramp(rate, 0.2), Hold(40.0)]), 40.0, motor=replace(motor, damping=damping))
     late = run.state.rate[run.t > 30.0]
     assert late.mean() == pytest.approx(rate, rel=0.05)
     if sticks:
@@ -198,4 +195,4 @@ def test_a_motor_that_cannot_be_is_refused(change, message):
 
 def test_a_run_that_does_not_stay_finite_is_one_line(world):
     with pytest.raises(InputError, match=r"did not stay finite with a physics step of 0\.001 s"):
-        drive(world, Steady(1.0), 1.0, motor=replace(MOTOR, viscous_Nms_rad=100.0))
+        drive(world, Steady(1.0), 1.0, motor=replace(MOTOR, viscous=100.0))

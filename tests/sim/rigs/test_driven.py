@@ -5,11 +5,10 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
-from msgspec import structs
 from mujoco.batch import Batch, SimulationError
 
 from gfimu import AccelerometerArray, InputError
-from sim import Drive, Hold, MotorTable, Ramp, channel_places, drive, drive_all, spin_profile
+from sim import DcMotor, Drive, Hold, Ramp, channel_places, drive, drive_all, spin_profile
 from sim.world import World
 
 COLUMNS = ("t", "readings", "tacho", "torque")
@@ -27,7 +26,7 @@ def varied(count, motor, seed=5):
             gravity=9.8 + 0.02 * rng.standard_normal(),
         )
         command = spin_profile([Hold(0.1), Ramp(rng.uniform(-6, 6), 0.3), Hold(1.0)])
-        figures = MotorTable(cogging_Nm=rng.uniform(0, 0.02), coulomb_Nm=rng.uniform(0.01, 0.03)) if motor else None
+        figures = DcMotor(cogging=rng.uniform(0, 0.02), coulomb=rng.uniform(0.01, 0.03)) if motor else None
         yield Drive(world, command, 1.0, motor=figures)
 
 
@@ -64,7 +63,7 @@ def test_a_batch_has_the_bits_of_a_plain_loop(motor):
 def test_runs_of_several_kinds_and_lengths_come_back_in_order():
     mixed = [*varied(2, True), *varied(2, False, seed=6), *varied(1, True, seed=7)]
     mixed[4] = replace(mixed[4], duration=0.5)
-    mixed[1] = replace(mixed[1], motor=MotorTable(inductance_H=0.0))  # fewer states: another layout
+    mixed[1] = replace(mixed[1], motor=DcMotor(inductance=0.0))  # fewer states: another layout
     shares = []
     for run, found in zip(mixed, drive_all(mixed, threads=2, progress=shares.append), strict=True):
         same(found, drive(run.world, run.command, run.duration, motor=run.motor))
@@ -87,8 +86,8 @@ def test_every_nth_state_is_one_of_all(monkeypatch, motor):
 def test_a_run_that_fails_leaves_the_others_alone(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     good, bad, refused = varied(3, True)
-    bad = replace(bad, motor=structs.replace(bad.motor, viscous_Nms_rad=100.0))  # unstable at this step
-    refused = replace(refused, motor=structs.replace(refused.motor, resistance_ohm=-1.0))
+    bad = replace(bad, motor=replace(bad.motor, viscous=100.0))  # unstable at this step
+    refused = replace(refused, motor=replace(refused.motor, resistance=-1.0))
     first, second, third = drive_all([good, bad, refused], threads=2)
     same(first, drive(good.world, good.command, good.duration, motor=good.motor))
     assert isinstance(second, InputError)
