@@ -42,7 +42,6 @@ if TYPE_CHECKING:
         SampleDecoder,
         Samples,
         Status,
-        encode_message,
         encode_samples,
         frame_format,
     )
@@ -57,7 +56,7 @@ if TYPE_CHECKING:
     from firmware_bridge.loop.physics import RidePhysics
     from firmware_bridge.loop.virtual_port import PseudoTerminal, TcpPort, open_port, serve
     from firmware_bridge.loop.virtual_run import record_virtual, typical_chips
-    from firmware_bridge.lpc1768.build import SOURCES, build, build_host_library, image_path
+    from firmware_bridge.lpc1768.build import SOURCES, build, image_path
     from firmware_bridge.lpc1768.elf import ElfImage
     from firmware_bridge.sender.project import write_project
     from firmware_bridge.sources.udp import UdpSource

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from sim.rigs.dc_motor import DcMotor
     from sim.rigs.driven import Drive, drive, drive_all
     from sim.rigs.mjcf_array import array_from_mjcf
-    from sim.rigs.rig_model import channel_places, free_model, turntable_model
+    from sim.rigs.rig_model import channel_places, free_spec, turntable_model
     from sim.rigs.turntable import prescribed_readings
 else:
     __getattr__, __dir__, __all__ = declared_names(__name__)

@@ -20,7 +20,6 @@ __all__ = [
     "TableGeometry",
     "arm_growth",
     "channels",
-    "growing_arms",
     "lean_states",
     "leaning",
     "nodding_motion",

@@ -169,7 +169,7 @@ class Ride:
             tacho = forward.reference(self.world, table, clipped)
             for step in self.world.motion_steps:
                 table = step(table, clipped)
-            columns["tacho_rad_s"] = tacho + chance.normal(size=len(t)) * self.scenario.reference.tacho_noise_std
+            columns["tacho_rad_s"] = tacho + chance.normal(size=len(t)) * self.scenario.reference.tacho_noise_std_rad_s
             columns["command_rad_s"] = _spin(self._command).at(clipped).rate
             columns["angle_rad"] = table.at(clipped - self.world.tacho_delay).angle
         return columns

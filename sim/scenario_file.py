@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -25,7 +24,7 @@ from sim.rigs.dc_motor import DcMotor
 from sim.rigs.motor_file import MotorTable
 from sim.twin_file import Inclination
 
-__all__ = ["ReferenceSettings", "ScenarioFile", "scenario_fields"]
+__all__ = ["ReferenceTable", "ScenarioFile", "scenario_fields"]
 
 Latitude = Annotated[float, msgspec.Meta(ge=-90.0, le=90.0)]
 """Geodetic latitude, degrees."""
@@ -33,34 +32,6 @@ Latitude = Annotated[float, msgspec.Meta(ge=-90.0, le=90.0)]
 _MOST_SAMPLES = 20_000_000  # of a run: 55 hours at 100 Hz
 _TWIN_MOTION = "paper_run"  # the motion of a twin file, which has none of its own
 _CARRIAGE_MOTION = "linear_axis"  # that of a twin file of a linear axis
-
-
-@dataclass(frozen=True)
-class ReferenceSettings:
-    """Quality of the references.
-
-    Parameters
-    ----------
-    tacho_noise_std : float
-        White noise of the tachometer, rad/s.
-    tacho_resolution : float
-        Step of the tachometer, rad/s (0: continuous).
-    encoder_resolution : float
-        Step of the angle encoder, rad (0: continuous).
-    gyro_noise_std : float or None
-        White noise of a reference gyro on the body, rad/s; None: no gyro.
-    carriage_noise_std : float
-        White noise of the place of a carriage, m.
-    carriage_resolution : float
-        Step of the place of a carriage, m (0: continuous).
-    """
-
-    tacho_noise_std: float = 0.0
-    tacho_resolution: float = 0.0
-    encoder_resolution: float = 0.0
-    gyro_noise_std: float | None = None
-    carriage_noise_std: float = 0.0
-    carriage_resolution: float = 0.0
 
 
 class SensorTable(Table, frozen=True):
@@ -148,17 +119,6 @@ class ReferenceTable(Table, frozen=True):
     carriage_resolution_m: Annotated[
         NotNegative, about("Step of the place of a carriage, such as a microstep; 0: continuous.", "m")
     ] = 0.0
-
-    def settings(self) -> ReferenceSettings:
-        """Return the settings."""
-        return ReferenceSettings(
-            self.tacho_noise_std_rad_s,
-            self.tacho_resolution_rad_s,
-            self.encoder_resolution_rad,
-            self.gyro_noise_std_rad_s,
-            self.carriage_noise_std_m,
-            self.carriage_resolution_m,
-        )
 
 
 class TemperatureTable(Table, frozen=True):
@@ -269,7 +229,7 @@ def scenario_fields(data: Mapping[str, Any], source: str, beside: Path | None) -
         "driven": file.drive.mode != "prescribed",
         "motor": _motor(file.drive, source),
         "physics_step": file.drive.step_s,
-        "reference": file.reference.settings(),
+        "reference": file.reference,
         "effects": tuple(table.effect(array, source) for table in file.effect),
         "temperature": file.temperature.course(),
     }

@@ -21,10 +21,10 @@ from sim.effects.unlisted import Unlisted
 from sim.motions.carried import Carriage
 from sim.motions.motion import BodyMotion, BodyState, SpinMotion
 from sim.rigs.dc_motor import DcMotor
-from sim.scenario_file import ReferenceSettings, scenario_fields
+from sim.scenario_file import ReferenceTable, scenario_fields
 from sim.world import World
 
-__all__ = ["ReferenceSettings", "Scenario"]
+__all__ = ["Scenario"]
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class Scenario:
         The motor of a driven table; by default a speed controller with limited torque.
     physics_step : float
         Step of the driven simulation, s.
-    reference : ReferenceSettings
+    reference : ReferenceTable
         Quality of the references.
     effects : tuple of Effect
         What is wrong in this world.
@@ -98,7 +98,7 @@ class Scenario:
     driven: bool = False
     motor: DcMotor | None = None
     physics_step: float = 1e-3
-    reference: ReferenceSettings = field(default_factory=ReferenceSettings)
+    reference: ReferenceTable = field(default_factory=ReferenceTable)
     effects: tuple[Effect, ...] = ()
     temperature: tuple[float, float, float] = (25.0, 25.0, 600.0)
     description: str = field(default="", compare=False)

@@ -24,7 +24,7 @@ from sim.motions.carried import Carriage, Wheel
 from sim.motions.motion import BodyMotion, BodyState, SpinMotion, SpinState
 from sim.rigs.driven import drive
 from sim.rigs.turntable import prescribed_readings
-from sim.scenario_file import ReferenceSettings
+from sim.scenario_file import ReferenceTable
 from sim.scenarios import Scenario
 from sim.truth import cube_state, truth_columns
 from sim.world import SampleContext, World
@@ -223,22 +223,22 @@ def _references(
         table = _spin(run.motion)
         for step in world.motion_steps:
             table = step(table, t)
-        tacho = forward.reference(world, _spin(run.motion), t) + rng.normal(size=len(t)) * quality.tacho_noise_std
-        columns["tacho_rad_s"] = _stepped(tacho, quality.tacho_resolution)
+        tacho = forward.reference(world, _spin(run.motion), t) + rng.normal(size=len(t)) * quality.tacho_noise_std_rad_s
+        columns["tacho_rad_s"] = _stepped(tacho, quality.tacho_resolution_rad_s)
         columns["command_rad_s"] = _spin(command).at(t).rate
         columns["angle_rad"] = _stepped(
-            table.at(t - world.tacho_delay).angle + world.angle_zero, quality.encoder_resolution
+            table.at(t - world.tacho_delay).angle + world.angle_zero, quality.encoder_resolution_rad
         )
     if isinstance(command, Wheel):
         late_spin = command.spin.at(t - world.tacho_delay)  # a tachometer has the reference's clock, as a table's
-        noise = rng.normal(size=len(t)) * quality.tacho_noise_std
-        columns["tacho_rad_s"] = _stepped(late_spin.rate + noise, quality.tacho_resolution)
-    if quality.gyro_noise_std is not None:
+        noise = rng.normal(size=len(t)) * quality.tacho_noise_std_rad_s
+        columns["tacho_rad_s"] = _stepped(late_spin.rate + noise, quality.tacho_resolution_rad_s)
+    if quality.gyro_noise_std_rad_s is not None:
         late = command.at(t / (1.0 + world.clock_ratio) - world.tacho_delay) if run.free else body
         rates = late.omega if isinstance(late, BodyState) else body.omega
         if world.earth_rate is not None:  # a gyro measures the rate against the stars
             rates = rates + earth_in_body(world.earth_rate, late if isinstance(late, BodyState) else body)
-        gyro = rates @ world.gyro_matrix.T + rng.normal(size=body.omega.shape) * quality.gyro_noise_std
+        gyro = rates @ world.gyro_matrix.T + rng.normal(size=body.omega.shape) * quality.gyro_noise_std_rad_s
         columns |= {f"gyro_{axis}_rad_s": gyro[:, index] for index, axis in enumerate("xyz")}
     return columns
 
@@ -247,14 +247,14 @@ def _carriage(
     command: Carriage,
     world: World,
     t: NDArray[np.float64],
-    quality: ReferenceSettings,
+    quality: ReferenceTable,
     rng: np.random.Generator,
 ) -> dict[str, NDArray[np.float64]]:
     """Return the commanded place, speed and acceleration of a carriage by column name, each (n,)."""
     state = command.at(t - world.tacho_delay)
-    place = state.angle + rng.normal(size=len(t)) * quality.carriage_noise_std
+    place = state.angle + rng.normal(size=len(t)) * quality.carriage_noise_std_m
     return {
-        "carriage_m": _stepped(place, quality.carriage_resolution),
+        "carriage_m": _stepped(place, quality.carriage_resolution_m),
         "carriage_speed_m_s": np.asarray(state.rate),
         "carriage_acceleration_m_s2": np.asarray(state.acceleration),
     }

@@ -6,12 +6,11 @@ from collections.abc import Mapping
 from typing import Any
 
 from effect_formulas import to_latex, vectors_of
-from effect_pages import link
+from effect_pages import PLACES, link, place_of
 
 from gfimu.diagnosis.design.proposal import SEPARATED
 from gfimu.diagnosis.policy import Policy
 from sim.effects.base import Effect
-from sim.effects.catalogue import PLACES, place_of
 from sim.effects.description import Description, describe
 
 __all__ = ["index_page"]

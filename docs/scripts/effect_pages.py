@@ -14,11 +14,21 @@ from gfimu.diagnosis.policy import Policy
 from gfimu.model.parameter_units import NAME, NUMBER, RATIO
 from sim.effects import BODY_EFFECTS, CARRIAGE_EFFECTS, FURTHER_EFFECTS, TABLE_EFFECTS
 from sim.effects.base import Effect
-from sim.effects.catalogue import PLACES, every_effect, place_of
+from sim.effects.catalogue import every_effect
 from sim.effects.description import Description, describe
 from sim.effects.unlisted import Unlisted
 
-__all__ = ["EXPERIMENTS", "link", "page"]
+__all__ = ["EXPERIMENTS", "PLACES", "link", "page", "place_of"]
+
+PLACES = {
+    "geometry": "where chips, axes and the table are",
+    "motion": "how the table and the array move",
+    "gravity": "what gravity adds along each axis",
+    "sensing": "from the specific force to the analogue reading, in each chip",
+    "sampling": "when chips and the reference are read, and what the reference reads",
+    "data": "noise, and the samples in the file",
+}
+"""Places in the chain, in its order, and what is there."""
 
 EXPERIMENTS = {
     "sweep": "speed sweep",
@@ -34,10 +44,21 @@ EXPERIMENTS = {
 }
 """Words for the experiments of `effect_rivals`."""
 
+_OF_GRAVITY = frozenset({"gravity", "table_tilt"})
+_PLACE = {"timing": "sampling", "reference": "sampling", "noise": "data"}
+_MOVING = frozenset({"bearing_shake", "bench_sway", "centrifugal_flex"})
 _UNITS = {RATIO: "1", NUMBER: "number", NAME: "name"}
 SLOWEST_LINE = 0.3  # Hz: what is slower is the course of the run
 LEAST, MOST = 0.1, 1000  # nats: what is less, or more, is printed so
 _ANY = Policy().seen
+
+
+def place_of(effect: type[Effect]) -> str:
+    """Return where an effect acts: a key of `PLACES`."""
+    if effect.name in _OF_GRAVITY:
+        return "gravity"
+    moves = effect.name in _MOVING or effect.name.startswith("lean_")
+    return "motion" if moves else _PLACE.get(effect.place, effect.place)
 
 
 def page(effect: type[Effect], numbers: Mapping[str, Any]) -> str:

@@ -14,7 +14,6 @@ __all__ = ["ConversionSource", "Readings", "format_count", "output_period", "wak
 ConversionSource = Callable[[int, int, int, int], NDArray[np.int32]]
 """(first tick, period in ticks, number, BW_RATE register) → raw conversions, shape (number, 3)."""
 
-Sample = tuple[int, int, int]
 BLOCK = 256  # conversions asked for at a time
 _SLOWEST_PERIOD = 1024 * TICKS_PER_SECOND // 100  # rate code 0: 0.09765625 Hz
 

@@ -246,11 +246,6 @@ class ChipCore:
 
     # Interrupts
 
-    def raise_event(self, event: int, now: int) -> None:
-        """Raise a tap, activity, inactivity or free-fall event (a bit of INT_SOURCE), as the sensing logic would."""
-        self.catch_up(now)
-        self._raise(event)
-
     def _raise(self, events: int) -> None:
         events &= self.registers[INT_ENABLE] & EVENTS
         if not events:

@@ -5,16 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, Protocol
 
-__all__ = [
-    "Bus",
-    "ClockTree",
-    "ExternalPins",
-    "InterruptLines",
-    "PinWatcher",
-    "RegisterBlock",
-    "Tracer",
-    "TransmitLine",
-]
+__all__ = ["Bus", "Tracer"]
 
 
 class Tracer(Protocol):

@@ -6,11 +6,10 @@ from firmware_bridge.adxl345.registers import TICKS_PER_SECOND
 from firmware_bridge.board.bus import Bus
 from firmware_bridge.board.peripheral import Peripheral
 
-__all__ = ["BROWN_OUT", "EXTERNAL", "POWER_ON", "SYSTEM_RESET", "WATCHDOG", "SystemControl"]
+__all__ = ["BROWN_OUT", "EXTERNAL", "POWER_ON", "WATCHDOG", "SystemControl"]
 
 POWER_ON, EXTERNAL, WATCHDOG, BROWN_OUT = 1, 2, 4, 8
 """Reset causes in RSID."""
-SYSTEM_RESET = 0
 
 _INTERNAL_OSCILLATOR_HZ = 4_000_000
 _CRYSTAL_HZ = 12_000_000

@@ -21,10 +21,8 @@ from firmware_bridge.frames.format_file import load_format
 from firmware_bridge.frames.frame_format import (
     FORMATS,
     LPC1768_DTYPE,
-    MIMU4444_DTYPE,
     FrameFormat,
     Status,
-    encode_message,
     encode_samples,
 )
 from gfimu.base.declared import Declared, figure
@@ -35,14 +33,12 @@ from gfimu.base.short_repr import short_repr
 __all__ = [
     "FORMATS",
     "LPC1768_DTYPE",
-    "MIMU4444_DTYPE",
     "FrameFormat",
     "FrameType",
     "SampleDecoder",
     "Samples",
     "Status",
     "StreamCounts",
-    "encode_message",
     "encode_samples",
     "frame_format",
 ]

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import enum
-import struct
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from firmware_bridge.frames.checksum import crc16, crc16_rows, sum16_rows
+from firmware_bridge.frames.checksum import crc16_rows, sum16_rows
 from firmware_bridge.frames.commands import (
     LPC1768_DIALOGUE,
     NO_TEMPERATURE,
@@ -24,16 +23,7 @@ from gfimu.array.array import AccelerometerArray
 from gfimu.array.parts.part import Part
 from gfimu.base.errors import InputError
 
-__all__ = [
-    "FORMATS",
-    "LPC1768_DTYPE",
-    "MIMU4444_DTYPE",
-    "FrameFormat",
-    "Status",
-    "TemperatureField",
-    "encode_message",
-    "encode_samples",
-]
+__all__ = ["FORMATS", "LPC1768_DTYPE", "FrameFormat", "Status", "TemperatureField", "encode_samples"]
 
 FRAME_VERSION = 1
 
@@ -293,19 +283,6 @@ def encode_samples(
     frames["counts"] = readings
     frames["status"] = status
     frames["temperature"] = temperature
-    return _sealed(frames)
-
-
-def encode_message(kind: FrameType, sequence: int, time_us: int, payload: bytes, status: int = 0) -> bytes:
-    """Encode one identity or reply frame of the format `lpc1768`; ``payload`` has at most 24 bytes."""
-    body = struct.pack(
-        "<2sBBHI24sHh", bytes(SYNC), FRAME_VERSION, kind, sequence & 0xFFFF, time_us, payload, status, NO_TEMPERATURE
-    )
-    return body + struct.pack("<H", crc16(body))
-
-
-def _sealed(frames: NDArray[Any]) -> bytes:
-    covered = frames.dtype.itemsize - 2
-    rows = frames.view(np.uint8).reshape(len(frames), frames.dtype.itemsize)
-    frames["crc"] = crc16_rows(rows[:, :covered])
+    rows = frames.view(np.uint8).reshape(len(frames), LPC1768_DTYPE.itemsize)
+    frames["crc"] = crc16_rows(rows[:, :-2])
     return frames.tobytes()

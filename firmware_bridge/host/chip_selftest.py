@@ -48,9 +48,7 @@ class AxisSelfTest(Declared):
     ]
 
 
-def check_chips(
-    port: str, *, baud: int | None = None, form: str = "lpc1768", array: str = "", at_3v3: bool = True
-) -> list[AxisSelfTest]:
+def check_chips(port: str, *, baud: int | None = None, form: str = "lpc1768", array: str = "") -> list[AxisSelfTest]:
     """Switch the self-test of the chips on and off over a port while the unit rests.
 
     Parameters
@@ -63,8 +61,6 @@ def check_chips(
         Frame format; it needs a board that takes commands.
     array : str
         Array on the board; by default the format's. With fewer chips only those are tested.
-    at_3v3 : bool
-        Whether the chips run from 3.3 V, as on the mbed, rather than from 2.5 V: the limits are wider.
 
     Raises
     ------
@@ -93,7 +89,7 @@ def check_chips(
         finally:
             link.write(encode_command(Command.SELF_TEST, 0))
     off, on = (np.where(run.counts == layout.no_reading, np.nan, run.counts * (scale / _COUNTS_PER_G)) for run in runs)
-    return judge(off, on, carried.channels, at_3v3=at_3v3)
+    return judge(off, on, carried.channels, at_3v3=True)
 
 
 def judge(

@@ -65,12 +65,7 @@ class ClockTrack:
     residual_s: float
 
 
-def track_clock(
-    time_s: NDArray[np.float64],
-    offset_s: NDArray[np.float64],
-    jump: NDArray[np.bool_],
-    policy: TrackPolicy | None = None,
-) -> ClockTrack:
+def track_clock(time_s: NDArray[np.float64], offset_s: NDArray[np.float64], jump: NDArray[np.bool_]) -> ClockTrack:
     """Smooth measured offsets of a clock whose rate is a random walk of unknown strength.
 
     Parameters
@@ -81,8 +76,6 @@ def track_clock(
         Measured offsets, s; NaN where only the track is wanted.
     jump : ndarray, shape (n,)
         Whether the offset may have any value here whatever it was before (the clock was set anew; its rate goes on).
-    policy : TrackPolicy, optional
-        Numbers of the model.
 
     Notes
     -----
@@ -91,7 +84,7 @@ def track_clock(
     is concentrated out of the likelihood, and the tracks are averaged with the likelihoods as weights. Huber's weights
     keep late arrivals from bending the track.
     """
-    rule = policy or TrackPolicy()
+    rule = TrackPolicy()
     seen = np.isfinite(offset_s)
     unit = _noise_level(offset_s[seen])
     start = float(offset_s[seen][0])

@@ -55,10 +55,10 @@ class Listener:
         self.chunks: list[Chunk] = []
         self.array = ""  # that the board states
 
-    def listen(self, link: Link, seconds: float = _LISTEN_S) -> tuple[FrameFormat, Identity | None] | None:
+    def listen(self, link: Link) -> tuple[FrameFormat, Identity | None] | None:
         """Ask, and return the format that is understood with the identity if one came; None if there is none."""
         begin = time.monotonic()  # before the question: some answer at once
-        end = begin + seconds
+        end = begin + _LISTEN_S
         for decoder in self._decoders:
             if decoder.format.dialogue is not None:
                 link.write(decoder.format.dialogue.identify)

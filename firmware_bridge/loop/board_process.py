@@ -26,12 +26,7 @@ from gfimu.base.child_process import environment
 from gfimu.base.errors import GfimuError, InputError, did_you_mean
 from gfimu.base.optional_packages import missing, require
 
-__all__ = ["BoardProcess", "emulator_available", "require_emulator"]
-
-
-def emulator_available() -> bool:
-    """Whether the emulator is installed."""
-    return not missing("unicorn")
+__all__ = ["BoardProcess", "require_emulator"]
 
 
 def require_emulator() -> None:

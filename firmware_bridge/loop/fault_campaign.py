@@ -13,7 +13,6 @@ from firmware_bridge.adxl345.registers import Adxl345Options, LineFault
 from firmware_bridge.frames.commands import Command, encode_command, sample_at
 from firmware_bridge.frames.decoder import LPC1768_DTYPE, FrameType, SampleDecoder, Status, StreamCounts
 from firmware_bridge.loop.board_process import BoardProcess
-from firmware_bridge.loop.physics import Conversions
 from gfimu.base.declared import Declared, Table, cell, figure
 from gfimu.base.results import TableResult, columns_of, text_column
 
@@ -219,13 +218,11 @@ FAULTS: dict[str, Scenario] = {
 """The faults, by name."""
 
 
-def run_fault(
-    name: str, *, physics: Conversions | None = None, seed: int = 0, fast: bool | None = None
-) -> FaultOutcome:
+def run_fault(name: str, *, seed: int = 0) -> FaultOutcome:
     """Run one fault of `FAULTS` and return its row."""
     chance = np.random.default_rng([seed, list(FAULTS).index(name)])
     options = tuple(Adxl345Options(phase=0.25 * index) for index in range(4))
-    with BoardProcess(physics, chips=options, fast=fast) as board:
+    with BoardProcess(chips=options) as board:
         _settle(board)
         line = FAULTS[name](board, chance)
     decoder = SampleDecoder()
@@ -259,13 +256,11 @@ def run_fault(
     )
 
 
-def run_campaign(
-    *, physics: Conversions | None = None, seed: int = 0, progress: Callable[[float], None] | None = None
-) -> FaultReport:
+def run_campaign(*, seed: int = 0, progress: Callable[[float], None] | None = None) -> FaultReport:
     """Run all faults; return the table."""
     rows = []
     for index, name in enumerate(FAULTS):
-        rows.append(run_fault(name, physics=physics, seed=seed))
+        rows.append(run_fault(name, seed=seed))
         if progress is not None:
             progress((index + 1) / len(FAULTS))
     return FaultReport(tuple(rows))

@@ -18,6 +18,7 @@ from typing import Annotated, Any, Protocol
 from numpy.typing import NDArray
 
 from firmware_bridge.adxl345.registers import TICKS_PER_SECOND
+from firmware_bridge.board.uart import FRAMING_ERROR
 from firmware_bridge.loop.board_process import BoardProcess
 from firmware_bridge.loop.line_speed import as_received, terminal_baud
 from gfimu.base.declared import Declared, Line, Table, figure, figures
@@ -32,7 +33,6 @@ _READ_BYTES = 4096
 _BUFFER_BYTES = 1 << 18
 _NOBODY_S = 1.0
 _PORTS = range(65536)
-_FRAMING_ERROR = 1 << 3  # of the UART's line status
 
 
 class VirtualPort(Protocol):
@@ -276,8 +276,7 @@ def serve(
     *,
     duration_s: float | None = None,
     realtime: bool = True,
-    stop: Callable[[], bool] | None = None,
-    on_progress: Callable[[float], None] | None = None,
+    stop: Callable[[], bool] = lambda: False,
 ) -> ServeReport:
     """Run a board behind a port until the time is up, ``stop`` says so, or Ctrl-C.
 
@@ -294,10 +293,8 @@ def serve(
     realtime : bool
         Keep pace with the clock on the wall: a host that reads late finds up to 256 KiB buffered, as a serial driver
         does, and what exceeds that, or nobody reads for a second, is lost. Otherwise run as fast as the host reads.
-    stop : callable, optional
+    stop : callable
         Asked often; True ends the run.
-    on_progress : callable, optional
-        Receives the virtual time done, s.
     """
     began = time.monotonic()
     first = now = board.now
@@ -305,17 +302,13 @@ def serve(
     end = None if duration_s is None else first + round(duration_s * TICKS_PER_SECOND)
     line = _Buffer(port)
     with _ask_to_stop() as interrupted:
-
-        def over() -> bool:
-            return interrupted() or (stop is not None and stop())
-
-        while (end is None or now < end) and not over():
+        while (end is None or now < end) and not interrupted() and not stop():
             target = now + round((_SLICE_S if realtime else _FAST_SLICE_S) * TICKS_PER_SECOND)
             before = board.baud()
             now = board.run_until(target if end is None else min(target, end))
             line.put(as_received(board.take_sent()[0], before, port.baud or before)[0])
             line.pass_on(0.0 if realtime else _SLICE_S)
-            while not realtime and line.waiting and not over():
+            while not realtime and line.waiting and not interrupted() and not stop():
                 line.pass_on(_SLICE_S)
             if realtime:
                 line.forget()
@@ -323,10 +316,8 @@ def serve(
             if asked:
                 ours = board.baud()
                 read, errors = as_received(asked, port.baud or ours, ours)
-                board.receive(read, _FRAMING_ERROR if errors else 0)
+                board.receive(read, FRAMING_ERROR if errors else 0)
                 received += len(asked)
-            if on_progress is not None:
-                on_progress((now - first) / TICKS_PER_SECOND)
             ahead = (now - first) / TICKS_PER_SECOND - (time.monotonic() - began)
             if realtime and ahead > 0:
                 time.sleep(ahead)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import struct
-import sys
 import tempfile
 import tomllib
 from collections.abc import Iterator, Mapping
@@ -24,12 +23,9 @@ from gfimu.base.optional_packages import require
 from gfimu.base.results import TableResult, one_row
 
 __all__ = [
-    "ARRAY_SYMBOL",
     "IMAGES",
     "BuildReport",
-    "array_definition",
     "build",
-    "build_host_library",
     "check_image",
     "compiler_version",
     "image_path",
@@ -227,31 +223,6 @@ def check_image(name: str = "gfimu") -> dict[str, str | bool]:
         "image_as_recorded": hashlib.sha256(elf.read_bytes()).hexdigest() == facts["sha256"],
         "sources_as_recorded": source_hash(name, facts["defines"]) == facts["source_sha256"],
     }
-
-
-def build_host_library(out: str | Path, *, array: str = "") -> Path:
-    """Compile the firmware's core for this computer, as a shared library for tests; return its path.
-
-    It states ``array``, if that is given.
-    """
-    compiler_version()
-    suffix = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
-    library = Path(out) / f"firmware_host{suffix}"
-    flags: tuple[str, ...] = (
-        "-std=c11",
-        "-O1",
-        "-g0",
-        "-shared",
-        "-fPIC",
-        "-Wall",
-        "-Wextra",
-        "-Werror",
-        "-fsanitize=undefined",
-    )
-    files = ("host/hal_host.c", "src/core.c", "src/adxl345.c")
-    flags += tuple(f"-D{key}={value}" for key, value in array_definition(array).items())
-    _zig("cc", *flags, "-fsanitize-trap=undefined", *files, "-o", str(library), cwd=FOLDER)
-    return library
 
 
 def _zig(*arguments: str, cwd: Path) -> str:

@@ -100,8 +100,6 @@ class Watch:
 
     peripherals: frozenset[str] | None = None
     """Names of the peripherals it looks at; None: all."""
-    rules: tuple[Rule, ...] = ()
-    """Rules it looks after."""
 
     def __init__(self, board: Board, ledger: Ledger, policy: Policy) -> None:
         self.board, self.ledger, self.policy = board, ledger, policy

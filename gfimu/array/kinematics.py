@@ -26,9 +26,6 @@ from gfimu.base.short_repr import short_repr
 __all__ = [
     "ALTERNATE_CORNERS",
     "MOTION_NAMES",
-    "JointEstimate",
-    "MotionEstimate",
-    "NullSpace",
     "closed_form",
     "joint_covariance",
     "joint_form",

@@ -9,15 +9,7 @@ from gfimu.array.array import AccelerometerArray
 from gfimu.base.errors import GeometryError
 from gfimu.base.files.model_files import list_models
 
-__all__ = [
-    "MOTION_NAMES",
-    "RANK_TOLERANCE",
-    "null_rows",
-    "require_all_motions",
-    "seeing_arrays",
-    "sees_all_motions",
-    "unseen_motions",
-]
+__all__ = ["MOTION_NAMES", "RANK_TOLERANCE", "null_rows", "require_all_motions", "seeing_arrays", "unseen_motions"]
 
 MOTION_NAMES = ("alpha_x", "alpha_y", "alpha_z", "p_x", "p_y", "p_z")
 """Order of the columns of J and of the rows of its left inverse."""

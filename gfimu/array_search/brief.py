@@ -12,25 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.array.array import AccelerometerArray
-from gfimu.array_search.objectives import Conditions
-from gfimu.array_search.problem import Problem, Sites, Tolerance
+from gfimu.array_search.objectives import Conditions, ObjectiveTable
+from gfimu.array_search.problem import Problem, Sites, ToleranceTable
 from gfimu.array_search.shapes import Shape, box, cylinder, sphere
 from gfimu.base.errors import InputError
 from gfimu.base.files.input_file import check_input
 from gfimu.base.files.model_files import read_toml
 from gfimu.base.files.schema import NotNegative, Positive, Table, Triple, about, read
 
-__all__ = [
-    "BoxTable",
-    "BriefFile",
-    "ObjectiveTable",
-    "SitesTable",
-    "ToleranceTable",
-    "load_brief",
-    "problem_of",
-    "sites_of_array",
-    "sites_of_csv",
-]
+__all__ = ["BoxTable", "BriefFile", "SitesTable", "load_brief", "problem_of", "sites_of_array", "sites_of_csv"]
 
 _Centre = Annotated[Triple, about("Centre, body frame.", "m")]
 _Edges = Annotated[Triple, about("Edges along body x, y, z; zero makes it flat.", "m", example=[0.1, 0.1, 0.05])]
@@ -86,43 +76,6 @@ class SitesTable(Table, frozen=True, tag_field="kind", tag="sites"):
         ),
     ]
     names: Annotated[str, about("Of an MJCF file: pattern of the names of the sites, such as mount_*.")] = "*"
-
-
-class ObjectiveTable(Table, frozen=True):
-    """What is to be small, and under which conditions."""
-
-    name: Annotated[
-        str,
-        about(
-            "gdop, gdop_joint, kappa, sigma_alpha, sigma_p, rate, drift or fault; with _worst at the end, the largest "
-            "over the tolerances."
-        ),
-    ] = "gdop"
-    length_unit_m: Annotated[
-        Positive | None,
-        about("Length that counts as 1 in GDOP and κ.", "m", default="half the longest edge around the volume"),
-    ] = None
-    noise_m_s2: Annotated[
-        Positive | None, about("White noise of a channel per sample.", "m/s²", default="the part's at sample_rate_hz")
-    ] = None
-    bias_m_s2: Annotated[
-        NotNegative | None, about("Bias of a channel, for drift.", "m/s²", default="the part's at switch-on")
-    ] = None
-    speed_rad_s: Annotated[Positive, about("Speed at which the bound of the rate error is taken.", "rad/s")] = math.tau
-    spin_axis: Annotated[Literal["x", "y", "z", "any"], about("Body axis of that spin; any: the three alike.")] = "z"
-    time_s: Annotated[Positive, about("Time after which drift counts.", "s")] = 30.0
-    fault_time_s: Annotated[Positive, about("Time within which a fault of a channel is to be found.", "s")] = 1.0
-    sample_rate_hz: Annotated[Positive, about("Sample rate, for noise, faults and drift.", "Hz")] = 100.0
-
-
-class ToleranceTable(Table, frozen=True):
-    """Machining and mounting: each chip is off by up to this, uniformly distributed."""
-
-    position_m: Annotated[NotNegative, about("Of each coordinate of each chip.", "m")] = 0.0
-    angle_rad: Annotated[NotNegative, about("Of the turn of each chip about each body axis.", "rad")] = 0.0
-    draws: Annotated[
-        int, about("Drawn arrays of which the worst counts, the same for every design.", ge=1, le=1000)
-    ] = 32
 
 
 class BriefFile(Table, frozen=True):
@@ -192,7 +145,6 @@ def problem_of(brief: BriefFile, sites: Sites | None = None) -> tuple[Problem, C
         volume = Sites(volume.positions, (), volume.name)
     named = {"free": None, "site": None, "body": np.eye(3)}
     chosen = named[brief.directions] if isinstance(brief.directions, str) else np.array(brief.directions, dtype=float)
-    allowed = brief.tolerance
     problem = Problem(
         brief.chips,
         brief.axes_per_chip,
@@ -201,20 +153,10 @@ def problem_of(brief: BriefFile, sites: Sites | None = None) -> tuple[Problem, C
         brief.min_spacing_m,
         chosen,
         brief.non_recursive,
-        None if allowed is None else Tolerance(allowed.position_m, allowed.angle_rad, allowed.draws),
+        brief.tolerance,
         wanted.length_unit_m,
     )
-    conditions = Conditions(
-        brief.part,
-        wanted.noise_m_s2,
-        wanted.bias_m_s2,
-        wanted.speed_rad_s,
-        wanted.spin_axis,
-        wanted.time_s,
-        wanted.fault_time_s,
-        wanted.sample_rate_hz,
-    )
-    return problem, conditions
+    return problem, Conditions(**msgspec.structs.asdict(wanted), part=brief.part)
 
 
 def sites_of_array(array: AccelerometerArray, name: str) -> Sites:

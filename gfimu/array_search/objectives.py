@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,13 +16,14 @@ from gfimu.array_search.criteria import Criterion, FaultCriterion, Goal, KappaCr
 from gfimu.array_search.problem import Problem
 from gfimu.base.declared import Declared, figure
 from gfimu.base.errors import GeometryError, InputError, unknown_name
+from gfimu.base.files.schema import NotNegative, Positive, Table, about
 from gfimu.base.units import MILLI_G
 from gfimu.budget.drift import ErrorSources
 from gfimu.budget.drift.weight import drift_weight
 from gfimu.rate.bounds.sample import omega_products_jacobian
 from gfimu.rate.health.detectable import least_fault
 
-__all__ = ["OBJECTIVES", "WORST", "Aim", "Conditions", "Objective", "Reached", "objective"]
+__all__ = ["OBJECTIVES", "WORST", "Aim", "Conditions", "Objective", "ObjectiveTable", "Reached", "objective"]
 
 WORST = "_worst"
 """Ending of the name of an objective that is judged by the worst draw of the tolerance."""
@@ -34,51 +35,41 @@ _SEEN_SHARE = 1e-6  # numerical: weight of the variances of all six motions besi
 _FEWEST_CHANNELS = {"gdop_joint": 9, "rate": 9, "fault": 7}  # six motions, and ω or a check besides
 
 
-@dataclass(frozen=True)
-class Conditions:
-    """Under which noise, speed and time the objectives hold.
+class ObjectiveTable(Table, frozen=True):
+    """What is to be small, and under which conditions."""
 
-    Parameters
-    ----------
-    part : str
-        Part of the chips, of which noise and bias are taken.
-    noise_m_s2 : float, optional
-        White noise of a channel per sample, m/s²; by default the part's at the sample rate, root mean square of its
-        axes.
-    bias_m_s2 : float, optional
-        Bias of a channel that drift counts, m/s²; by default what the part's data sheet says at switch-on.
-    speed_rad_s : float
-        Angular speed of the bound of the rate error, rad/s.
-    spin_axis : str
-        Body axis of that spin: x, y, z, or any: the mean square over the three.
-    time_s : float
-        Time after which drift counts, s.
-    fault_time_s : float
-        Time within which a fault of a channel is to be found, s.
-    sample_rate_hz : float
-        Sample rate, Hz: of the noise per sample, of faults and of drift.
-    """
+    name: Annotated[
+        str,
+        about(
+            "gdop, gdop_joint, kappa, sigma_alpha, sigma_p, rate, drift or fault; with _worst at the end, the largest "
+            "over the tolerances."
+        ),
+    ] = "gdop"
+    length_unit_m: Annotated[
+        Positive | None,
+        about("Length that counts as 1 in GDOP and κ.", "m", default="half the longest edge around the volume"),
+    ] = None
+    noise_m_s2: Annotated[
+        Positive | None, about("White noise of a channel per sample.", "m/s²", default="the part's at sample_rate_hz")
+    ] = None
+    bias_m_s2: Annotated[
+        NotNegative | None, about("Bias of a channel, for drift.", "m/s²", default="the part's at switch-on")
+    ] = None
+    speed_rad_s: Annotated[Positive, about("Speed at which the bound of the rate error is taken.", "rad/s")] = math.tau
+    spin_axis: Annotated[Literal["x", "y", "z", "any"], about("Body axis of that spin; any: the three alike.")] = "z"
+    time_s: Annotated[Positive, about("Time after which drift counts.", "s")] = 30.0
+    fault_time_s: Annotated[Positive, about("Time within which a fault of a channel is to be found.", "s")] = 1.0
+    sample_rate_hz: Annotated[Positive, about("Sample rate, for noise, faults and drift.", "Hz")] = 100.0
+
+
+class Conditions(ObjectiveTable, frozen=True):
+    """An objective with the part of the chips, of which noise and bias are taken where they are not given."""
 
     part: str = "adxl345"
-    noise_m_s2: float | None = None
-    bias_m_s2: float | None = None
-    speed_rad_s: float = math.tau
-    spin_axis: str = "z"
-    time_s: float = 30.0
-    fault_time_s: float = 1.0
-    sample_rate_hz: float = 100.0
-
-    def __post_init__(self) -> None:
-        for name in ("speed_rad_s", "time_s", "fault_time_s", "sample_rate_hz"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0):
-                raise InputError(f"{name} = {value!r}: must be a positive number")
-        if self.spin_axis not in {"x", "y", "z", "any"}:
-            raise InputError(f"unknown spin axis {self.spin_axis!r}; valid: x, y, z, any")
 
     @property
     def noise(self) -> float:
-        """White noise of a channel per sample, m/s²."""
+        """White noise of a channel per sample, m/s², root mean square of its axes."""
         if self.noise_m_s2 is not None:
             return self.noise_m_s2
         return float(np.sqrt(np.mean(Part.load(self.part).noise_std(self.sample_rate_hz) ** 2)))

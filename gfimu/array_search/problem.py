@@ -11,6 +11,7 @@ import itertools
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +20,9 @@ from scipy.spatial.transform import Rotation
 from gfimu.array.array import AccelerometerArray, Chip
 from gfimu.array_search.shapes import LATTICE, Shape, frames_across
 from gfimu.base.errors import GeometryError, InputError
+from gfimu.base.files.schema import NotNegative, Table, about
 
-__all__ = ["Candidates", "Design", "Problem", "Sites", "Tolerance", "rows_of", "slopes_by_design"]
+__all__ = ["Candidates", "Design", "Problem", "Sites", "ToleranceTable", "rows_of", "slopes_by_design"]
 
 _Vector = NDArray[np.float64]
 
@@ -55,33 +57,14 @@ class Sites:
             raise InputError(f"{self.name}: an axis of a candidate site is not finite")
 
 
-@dataclass(frozen=True)
-class Tolerance:
-    """Errors of machining and mounting against which an array is judged by its worst draw.
+class ToleranceTable(Table, frozen=True):
+    """Machining and mounting: each chip is off by up to this, uniformly distributed."""
 
-    Parameters
-    ----------
-    position_m : float
-        Each coordinate of each chip is off by up to this, m.
-    angle_rad : float
-        Each chip is turned by up to this about each body axis, rad.
-    draws : int
-        Number of drawn arrays; the nominal one counts besides.
-    seed : int
-        Seed of the draws, which are the same for every design.
-    """
-
-    position_m: float = 0.0
-    angle_rad: float = 0.0
-    draws: int = 32
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        for name, value in (("position", self.position_m), ("angle", self.angle_rad)):
-            if not (math.isfinite(value) and value >= 0):
-                raise InputError(f"tolerance: {name} {value!r} must be zero or a positive number")
-        if self.draws < 1:
-            raise InputError(f"tolerance: draws = {self.draws}: must be at least 1")
+    position_m: Annotated[NotNegative, about("Of each coordinate of each chip.", "m")] = 0.0
+    angle_rad: Annotated[NotNegative, about("Of the turn of each chip about each body axis.", "rad")] = 0.0
+    draws: Annotated[
+        int, about("Drawn arrays of which the worst counts, the same for every design.", ge=1, le=1000)
+    ] = 32
 
 
 @dataclass(frozen=True)
@@ -142,7 +125,7 @@ class Problem:
         them.
     non_recursive : bool
         Whether α = (S a)₁…₃ must be free of ω².
-    tolerance : Tolerance, optional
+    tolerance : ToleranceTable, optional
         Of the worst case.
     length_unit_m : float, optional
         Half the longest edge around the volume by default.
@@ -155,7 +138,7 @@ class Problem:
     min_spacing_m: float = 0.005
     directions: _Vector | None = None
     non_recursive: bool = False
-    tolerance: Tolerance | None = None
+    tolerance: ToleranceTable | None = None
     length_unit_m: float | None = None
 
     def __post_init__(self) -> None:
@@ -288,7 +271,7 @@ class Problem:
         """Displacements, shape (d, n, 3), and rotations, shape (d, n, 3, 3); the first draw is the nominal array."""
         if self.tolerance is None:
             return None
-        rng, size = np.random.default_rng(self.tolerance.seed), (self.tolerance.draws + 1, self.n_chips, 3)
+        rng, size = np.random.default_rng(0), (self.tolerance.draws + 1, self.n_chips, 3)
         moved = rng.uniform(-1.0, 1.0, size) * self.tolerance.position_m / self.unit
         turned = rng.uniform(-1.0, 1.0, size) * self.tolerance.angle_rad
         moved[0], turned[0] = 0.0, 0.0

@@ -231,7 +231,8 @@ def best_design(
         value, design = _one_start(problem, goal, given, rng, kicks)
         made += 1
         if feasible(problem, design) and not (problem.non_recursive and leaks(design)):
-            (blind if _sees_too_little(design) else ends).append((value, design))
+            sees_too_little = np.linalg.svd(design.rows[:, :6], compute_uv=False)[-1] < _UNSEEN
+            (blind if sees_too_little else ends).append((value, design))
         if report is not None:
             report(made / (starts + len(also)))
         best = min((one for one, _ in ends), default=math.inf)
@@ -284,10 +285,6 @@ def _rounded(problem: Problem, goal: Goal, design: Design, value: float) -> Desi
     costs_nothing = log_figure(problem, goal, tidy) <= value + _ROUNDING_COST
     clean = not (problem.non_recursive and leaks(tidy))
     return tidy if costs_nothing and clean and feasible(problem, tidy) else design
-
-
-def _sees_too_little(design: Design) -> bool:
-    return bool(np.linalg.svd(design.rows[:, :6], compute_uv=False)[-1] < _UNSEEN)
 
 
 def _is_centred_box(problem: Problem) -> bool:

@@ -112,7 +112,8 @@ def array_motion(recording: Recording, array: AccelerometerArray, reference: Mot
         if iteration == 0:
             before = float(np.sqrt(np.mean(reduced_residual[:, :c] ** 2))) * sigma
         triangle = np.asarray(np.linalg.qr(np.column_stack([flat, right]), mode="r"))
-        scale = np.repeat([1.0 / max(_typical_rate2(omega), 1e-9), 1.0], [3 * k, c])  # m and m/s² of equal effect
+        typical = float(np.sqrt(np.mean(np.sum(omega**2, axis=1) ** 2)))  # ω², (rad/s)²
+        scale = np.repeat([1.0 / max(typical, 1e-9), 1.0], [3 * k, c])  # m and m/s² of equal effect
         left, s, vt = np.linalg.svd(triangle[:-1, :-1] * scale)
         rank = int(np.sum(s > _RANK_TOLERANCE * s[0]))
         inverse = scale[:, None] * (vt[:rank].T / s[:rank])
@@ -140,10 +141,6 @@ def array_motion(recording: Recording, array: AccelerometerArray, reference: Mot
         len(y),
         reference.kind,
     )
-
-
-def _typical_rate2(omega: Floats) -> float:
-    return float(np.sqrt(np.mean(np.sum(omega**2, axis=1) ** 2)))
 
 
 def gradient(omega: Floats, alpha: Floats) -> Floats:

@@ -18,15 +18,13 @@ __all__ = ["read_text_triad"]
 _LONGEST_REASON = 160
 
 
-def read_text_triad(path: str | Path, *, channels: tuple[str, str, str] = ("a11", "a12", "a13")) -> Recording:
+def read_text_triad(path: str | Path) -> Recording:
     """Read a text file of rows ``time x y z``: seconds and raw counts of one triad.
 
     Parameters
     ----------
     path : str or Path
         Text file, optionally gzipped, columns separated by blanks; lines that start with # are skipped.
-    channels : tuple of str
-        Names the three columns get.
 
     Returns
     -------
@@ -54,4 +52,4 @@ def read_text_triad(path: str | Path, *, channels: tuple[str, str, str] = ("a11"
         raise InputError(
             f"{file}: time does not increase at row {int(np.argmax(backwards)) + 2}, or a value is not finite"
         )
-    return Recording(table[:, 0], table[:, 1:], channels, unit="lsb", metadata={"source": file.name})
+    return Recording(table[:, 0], table[:, 1:], ("a11", "a12", "a13"), unit="lsb", metadata={"source": file.name})

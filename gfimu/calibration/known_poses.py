@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from gfimu.base.errors import InputError
 from gfimu.calibration.coverage import FACES, check_faces, pose_directions
 from gfimu.calibration.error_model import ErrorModel
 from gfimu.calibration.observations import Observations
@@ -15,10 +14,8 @@ __all__ = ["face_poses", "forward_design", "levelling_covariance"]
 Floats = NDArray[np.float64]
 
 
-def face_poses(
-    observations: Observations, gravity: float, references: ArrayLike | None = None
-) -> tuple[Observations, Floats]:
-    """Keep the poses whose true input is known and return it.
+def face_poses(observations: Observations, gravity: float) -> tuple[Observations, Floats]:
+    """Keep the poses nearest to the six faces, and return their true input; those more than 20° off are left out.
 
     Parameters
     ----------
@@ -26,9 +23,6 @@ def face_poses(
         Rows of one triad.
     gravity : float
         Local gravity, m/s².
-    references : array_like, shape (p, 3), optional
-        True specific force of each pose, m/s²; by default each pose is taken as the nearest of the six faces, and
-        poses more than 20° from every face are left out.
 
     Returns
     -------
@@ -40,13 +34,8 @@ def face_poses(
     Raises
     ------
     InputError
-        If a face is missing, or the references don't fit the poses.
+        If a face is missing.
     """
-    if references is not None:
-        given = np.asarray(references, dtype=float)
-        if given.shape != (observations.n_poses, 3):
-            raise InputError(f"{observations.n_poses} poses need references of shape ({observations.n_poses}, 3)")
-        return observations, given
     face = check_faces(pose_directions(observations.means))
     kept = np.flatnonzero(face >= 0)
     return observations.keep(kept), gravity * FACES[face[kept]]

@@ -23,7 +23,6 @@ from gfimu.calibration.parameter_names import parameter_names, quadratic_names
 from gfimu.calibration.result import Calibration
 
 __all__ = [
-    "WEIGHTINGS",
     "adjust_triad",
     "magnitude_condition",
     "multi_position",

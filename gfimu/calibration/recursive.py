@@ -212,13 +212,7 @@ class RecursiveCalibrator:
         return np.concatenate([model.parameters(self.gauge), estimate[len(estimate) - self._bends :]]), jacobian
 
 
-def recursive(
-    observations: Observations,
-    *,
-    gravity: float,
-    gauge: str = "poses",
-    references: ArrayLike | None = None,
-) -> Calibration:
+def recursive(observations: Observations, *, gravity: float, gauge: str = "poses") -> Calibration:
     """Calibrate one triad by recursive least squares over known poses.
 
     Parameters
@@ -229,8 +223,6 @@ def recursive(
         Local gravity, m/s².
     gauge : {"poses", "x_axis", "z_axis"}
         ``poses`` estimates all 12 parameters, the others a triangular M with 9.
-    references : array_like, shape (p, 3), optional
-        True specific force per pose, m/s², instead of the six faces.
 
     Returns
     -------
@@ -241,22 +233,22 @@ def recursive(
     InputError
         If a face is missing.
     """
-    kept, references_of_pose = face_poses(observations, gravity, references)
+    kept, references = face_poses(observations, gravity)
     centre, radius = fit_sphere(kept.means)
     calibrator = RecursiveCalibrator(
-        radius / float(np.linalg.norm(references_of_pose, axis=1).mean()),
+        radius / float(np.linalg.norm(references, axis=1).mean()),
         gauge=gauge,
         quadratic_std=kept.quadratic_prior if kept.bends else None,
         centre=centre,
     )
     for reading, pose in zip(kept.readings, kept.pose, strict=True):
-        calibrator.update(reading, references_of_pose[pose], kept.covariance[pose])
+        calibrator.update(reading, references[pose], kept.covariance[pose])
     result = calibrator.calibration(
         unit=observations.unit,
         channels=observations.channels,
         gravity=gravity,
         input_kind=observations.kind,
-        misfit=_pose_misfit(calibrator, kept, references_of_pose, centre),
+        misfit=_pose_misfit(calibrator, kept, references, centre),
     )
     return replace(result, statements=(*result.statements, *quadratic_statement(observations)))
 

@@ -7,7 +7,7 @@ down in turn; a tilt of the table or of a face goes into the misalignments in fu
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from gfimu.calibration.error_model import free_elements
 from gfimu.calibration.fit_quality import covariance_scale
@@ -23,12 +23,7 @@ Floats = NDArray[np.float64]
 
 
 def six_position(
-    observations: Observations,
-    *,
-    gravity: float,
-    gauge: str = "poses",
-    levelling_std_rad: float = 0.0,
-    references: ArrayLike | None = None,
+    observations: Observations, *, gravity: float, gauge: str = "poses", levelling_std_rad: float = 0.0
 ) -> Calibration:
     """Calibrate one triad from six poses on a level table.
 
@@ -42,8 +37,6 @@ def six_position(
         ``poses`` estimates all 12 parameters, the others a triangular M with 9.
     levelling_std_rad : float
         Standard deviation of the tilt of a pose per axis, rad; enters the weights and the standard deviations.
-    references : array_like, shape (p, 3), optional
-        True specific force per pose, m/s², instead of the six faces.
 
     Returns
     -------
@@ -54,8 +47,8 @@ def six_position(
     InputError
         If a face is missing.
     """
-    kept, references_of_pose = face_poses(observations, gravity, references)
-    truth = references_of_pose[kept.pose]  # (n, 3)
+    kept, references = face_poses(observations, gravity)
+    truth = references[kept.pose]  # (n, 3)
     rows_in_pose = np.bincount(kept.pose)[kept.pose]
     design = forward_design(truth, free_elements(gauge))  # (n, 3, u)
     covariance, mean_covariance = kept.row_covariance, kept.mean_covariance
@@ -64,7 +57,7 @@ def six_position(
     # The levelling term and the bend of the axes need M, which the first pass gives.
     for _ in range(2 if levelling_std_rad > 0.0 or kept.bends else 0):
         model = triad_model(estimate, gauge)
-        tilt = levelling_covariance(model, references_of_pose, levelling_std_rad)
+        tilt = levelling_covariance(model, references, levelling_std_rad)
         # All rows of a pose share its tilt, so that each row of n carries n times the variance of the mean.
         covariance = kept.row_covariance + tilt[kept.pose] * rows_in_pose[:, None, None]
         mean_covariance = kept.mean_covariance + tilt
@@ -72,13 +65,13 @@ def six_position(
         whole = np.concatenate([design, bend[:, :, None] * np.eye(3)], axis=2) if kept.bends else design
         estimate, cofactor = _least_squares(whole, kept.readings, covariance, prior)
     model = triad_model(estimate, gauge)
-    residual = kept.means - model.read(references_of_pose)
+    residual = kept.means - model.read(references)
     square = np.einsum("pi,pij,pj->", residual, np.linalg.inv(mean_covariance), residual)
     square += np.sum((model.quadratic / prior) ** 2) if kept.bends else 0.0
     redundancy = 3 * kept.n_poses - design.shape[2]  # a prior for every coefficient
     factor = float(square) / redundancy if redundancy else float("nan")
     scale, warnings = covariance_scale(factor, redundancy, observations.variance_factor)
-    miss = np.linalg.norm(model.correct(kept.means), axis=1) - np.linalg.norm(references_of_pose, axis=1)
+    miss = np.linalg.norm(model.correct(kept.means), axis=1) - np.linalg.norm(references, axis=1)
     return Calibration(
         "six-position",
         observations.unit,

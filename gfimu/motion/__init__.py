@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from gfimu.base.lazy_names import declared_names
 
 if TYPE_CHECKING:
-    from gfimu.motion.attitude import ATTITUDE_METHODS, from_rotation, table_angle, to_rotation, twist_angle
+    from gfimu.motion.attitude import ATTITUDE_METHODS, from_rotation, table_angle, to_rotation
     from gfimu.motion.axis_estimation import estimate_about_axis
     from gfimu.motion.body_drive import BodyDrive
     from gfimu.motion.rest_navigation import navigate_with_rest

@@ -30,7 +30,6 @@ __all__ = [
     "integrate_attitude",
     "table_angle",
     "to_rotation",
-    "twist_angle",
 ]
 
 ATTITUDE_METHODS = ("exponential", "coning", "fourth_order", "runge_kutta")
@@ -143,24 +142,6 @@ def table_angle(
     direction = np.asarray(axis, dtype=float)
     direction = direction / np.linalg.norm(direction)
     return integrate_samples(t, np.asarray(omega, dtype=float) @ direction, angle0, method=method)
-
-
-def twist_angle(quaternion: ArrayLike) -> NDArray[np.float64]:
-    """Angle of the turn about the world's z that an attitude holds.
-
-    Parameters
-    ----------
-    quaternion : array_like, shape (n, 4)
-        Attitudes (w, x, y, z), body to world, close enough in time that neighbours differ by less than π.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        Angle ψ, rad, unwrapped over the rows, of the decomposition into a turn ψ about z and a tilt about a
-        horizontal direction.
-    """
-    q = np.atleast_2d(np.asarray(quaternion, dtype=float))
-    return np.unwrap(2.0 * np.arctan2(q[:, 3], q[:, 0]))
 
 
 def to_rotation(quaternion: ArrayLike) -> Rotation:

@@ -31,15 +31,7 @@ from gfimu.base.compiled import compiled
 from gfimu.base.declared import Declared, figure
 from gfimu.base.short_repr import short_repr
 
-__all__ = [
-    "Disagreement",
-    "DisagreementPolicy",
-    "MeasuredNoise",
-    "ScaleSoFar",
-    "lasting_scale",
-    "measured_scale",
-    "sum_up_disagreement",
-]
+__all__ = ["Disagreement", "MeasuredNoise", "ScaleSoFar", "lasting_scale", "measured_scale", "sum_up_disagreement"]
 
 
 _MEMORIES = 8.0  # numerical: of the longer memory, beyond which samples count for nothing
@@ -123,15 +115,10 @@ def measured_scale(
 
 
 def lasting_scale(
-    squares: NDArray[np.float64],
-    freedom: NDArray[np.float64],
-    period: float,
-    *,
-    causal: bool = False,
-    policy: DisagreementPolicy = POLICY,
+    squares: NDArray[np.float64], freedom: NDArray[np.float64], period: float, *, causal: bool = False
 ) -> NDArray[np.float64]:
     """Return s̃ of each sample by the mean over about a second around it alone, shape (n,); as `measured_scale`."""
-    smooth = replace(policy, prior=_ALONE, memory=policy.long_memory_s / period, false_alarm=policy.long_false_alarm)
+    smooth = replace(POLICY, prior=_ALONE, memory=POLICY.long_memory_s / period, false_alarm=POLICY.long_false_alarm)
     return measured_scale(squares, freedom, period, causal=causal, policy=smooth)
 
 
@@ -144,21 +131,19 @@ class ScaleSoFar:
         Sample period, s.
     lasting : bool
         Whether s̃ is the mean over about a second alone.
-    policy : DisagreementPolicy, optional
-        Memory and significance.
     """
 
-    def __init__(self, period: float, *, lasting: bool, policy: DisagreementPolicy = POLICY) -> None:
-        self._period, self._policy = period, policy
+    def __init__(self, period: float, *, lasting: bool) -> None:
+        self._period = period
         self._scale = lasting_scale if lasting else measured_scale
-        self._kept = round(_MEMORIES * policy.long_memory_s / period)
+        self._kept = round(_MEMORIES * POLICY.long_memory_s / period)
         self._squares, self._freedom = np.zeros(0), np.zeros(0)
 
     def push(self, squares: NDArray[np.float64], freedom: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return s̃ (n,) of further samples, by sums of squares (n,) and degrees of freedom (n,)."""
         self._squares = np.concatenate([self._squares[-self._kept :], squares])
         self._freedom = np.concatenate([self._freedom[-self._kept :], freedom])
-        found = self._scale(self._squares, self._freedom, self._period, causal=True, policy=self._policy)
+        found = self._scale(self._squares, self._freedom, self._period, causal=True)
         return found[len(found) - len(squares) :]
 
 
@@ -287,11 +272,9 @@ _FEWEST_TURNING = 30
 _TURNING = 1.0  # rad/s
 
 
-def sum_up_disagreement(
-    scale: NDArray[np.float64], omega: NDArray[np.float64], policy: DisagreementPolicy = POLICY
-) -> Disagreement:
+def sum_up_disagreement(scale: NDArray[np.float64], omega: NDArray[np.float64]) -> Disagreement:
     """Sum up the scale s̃ (n,) of a run with the rates ``omega`` (n, 3), rad/s."""
-    large = scale > policy.notable_ratio
+    large = scale > POLICY.notable_ratio
     share = float(np.mean(large)) if len(large) else 0.0
     speed = np.linalg.norm(omega, axis=1)
     turning = np.flatnonzero(speed > _TURNING)
@@ -303,7 +286,7 @@ def sum_up_disagreement(
               (scale[slow], scale[fast], speed[slow], speed[fast])]  # fmt: skip
     return Disagreement(
         enlarged=bool(np.any(scale > 1.0)),
-        notable=share >= policy.notable_share,
+        notable=share >= POLICY.notable_share,
         share=share,
         times=float(np.median(scale[large])) if large.any() else 1.0,
         slow_times=median[0],

@@ -277,11 +277,6 @@ class KalmanRateFilter:
         return self.state.x[:3].copy()
 
     @property
-    def covariance(self) -> NDArray[np.float64]:
-        """Covariance of the latest estimate, shape (3, 3), (rad/s)²."""
-        return self.state.covariance[:3, :3].copy()
-
-    @property
     def report(self) -> ChannelReport:
         """What was wrong with the channels so far."""
         others = self._blind, self._gaps, self.restarts, self._unusable

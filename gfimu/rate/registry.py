@@ -95,6 +95,6 @@ def rate_method(name: str) -> RateMethod:
     return known[name]
 
 
-def recursive_methods(separator: str = " or ") -> str:
+def recursive_methods() -> str:
     """Names of the recursive methods, for messages."""
-    return separator.join(method.name for method in _RECORDS if method.recursive)
+    return " or ".join(method.name for method in _RECORDS if method.recursive)

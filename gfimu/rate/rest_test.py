@@ -146,11 +146,7 @@ def shown_variance(z):  # type: ignore[no-untyped-def]
 
 
 def constant_readings(
-    array: AccelerometerArray,
-    readings: ArrayLike,
-    noise_std: ArrayLike,
-    period: float,
-    test: RestTest | None = None,
+    array: AccelerometerArray, readings: ArrayLike, noise_std: ArrayLike, period: float
 ) -> NDArray[np.bool_]:
     """Blocks whose readings are constant: the part of the test that needs no filter (scatter and halves).
 
@@ -166,15 +162,13 @@ def constant_readings(
         White noise of each channel per sample, m/s².
     period : float
         Sample period, s.
-    test : RestTest, optional
-        Settings.
 
     Returns
     -------
     ndarray of bool, shape (n,)
         True in the blocks that pass; False in an incomplete last block and where a reading is missing.
     """
-    settings = test or RestTest()
+    settings = RestTest()
     rows = np.asarray(readings, dtype=float) / np.broadcast_to(np.asarray(noise_std, dtype=float), (array.n_channels,))
     null = ChannelTables(array, SensorErrors.uniform(array, noise_std)).null_rows[0] * noise_std
     window = settings.window(period)

@@ -125,23 +125,21 @@ class _ChainState(NamedTuple):
         return cls(np.tile(mean, (2, 1)), spread, np.full(2, 0.5), np.array([start is not None]))
 
 
-def sign_probabilities(steps: SignSteps, *, policy: SignPolicy = _POLICY) -> NDArray[np.float64]:
+def sign_probabilities(steps: SignSteps) -> NDArray[np.float64]:
     """Return the probability, shape (n,), that each sample's rate is ``omega`` and not ``−omega``; NaN without one.
 
     Parameters
     ----------
     steps : SignSteps
         Rates but for their sign, and α.
-    policy : SignPolicy, optional
-        Numbers of the chain.
     """
-    half = max(1, round(0.5 * policy.window_s / _period(steps.t)))
-    real = replace(steps, alpha=_real_part(steps, half, half, policy))
-    ahead = _run(real, _ChainState.begin(steps.start, steps.start_std), 0, -1, _period(steps.t), policy)
+    half = max(1, round(0.5 * _POLICY.window_s / _period(steps.t)))
+    real = replace(steps, alpha=_real_part(steps, half, half, _POLICY))
+    ahead = _run(real, _ChainState.begin(steps.start, steps.start_std), 0, -1, _period(steps.t), _POLICY)
     # Backward in time, α changes its sign: ω(t − Δt) = ω(t) − Δt α.
     columns: dict[str, Any] = {name: np.ascontiguousarray(getattr(real, name)[::-1]) for name in _COLUMNS}
     turned = replace(real, **columns | {"t": -columns["t"], "alpha": -columns["alpha"]})
-    back = _run(turned, _ChainState.begin(None, 1.0), 0, -1, _period(steps.t), policy)[::-1]
+    back = _run(turned, _ChainState.begin(None, 1.0), 0, -1, _period(steps.t), _POLICY)[::-1]
     both = ahead * back
     return both / (both + (1.0 - ahead) * (1.0 - back))
 
@@ -153,13 +151,11 @@ class SignChain:
     ----------
     period : float
         Sample period, s.
-    policy : SignPolicy, optional
-        Numbers of the chain.
     """
 
-    def __init__(self, period: float, policy: SignPolicy = _POLICY) -> None:
-        self._period, self._policy = period, policy
-        self._window = max(1, round(policy.window_s / period))
+    def __init__(self, period: float) -> None:
+        self._period = period
+        self._window = max(1, round(_POLICY.window_s / period))
         self._state: _ChainState | None = None
         self._past: SignSteps | None = None  # the last samples, over which the power of α is averaged
 
@@ -176,9 +172,9 @@ class SignChain:
         first = len(all_steps.t) - count
         used = np.isfinite(all_steps.alpha[:, 0]) & (np.isfinite(all_steps.omega[:, 0]) | all_steps.rest)
         seen = np.flatnonzero(used[:first])
-        real = replace(all_steps, alpha=_real_part(all_steps, self._window, 0, self._policy))
+        real = replace(all_steps, alpha=_real_part(all_steps, self._window, 0, _POLICY))
         last = int(seen[-1]) if seen.size else -1
-        found = _run(real, self._state, first, last, self._period, self._policy)[first:]
+        found = _run(real, self._state, first, last, self._period, _POLICY)[first:]
         tail: dict[str, Any] = {name: getattr(all_steps, name)[-self._window :] for name in _COLUMNS}
         self._past = replace(steps, **tail)
         return found

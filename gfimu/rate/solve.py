@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.array.array import AccelerometerArray
 from gfimu.array.integration import integrate_rate
 from gfimu.rate.consistency import judge_consistency
 from gfimu.rate.disagreement import MeasuredNoise, sum_up_disagreement
@@ -117,7 +116,8 @@ def _of_living_channels(problem: RateProblem) -> tuple[RateProblem, dict[str, st
     array = problem.array
     alive: NDArray[np.bool_] = np.asarray(np.isfinite(problem.readings).any(axis=0))
     living = [name for name, lives in zip(array.channels, alive, strict=True) if lives]
-    if alive.all() or np.linalg.matrix_rank(array.regression_matrix[alive] / _length_scale(array), tol=1e-6) < 6:
+    scale = np.array([array.length_unit] * 3 + [1.0] * 3)
+    if alive.all() or np.linalg.matrix_rank(array.regression_matrix[alive] / scale, tol=1e-6) < 6:
         return problem, {name: name for name in array.channels}
     chips = [replace(chip, axes=chip.axes[alive[array.chip_of_channel == k]]) for k, chip in enumerate(array.chips)]
     fewer = replace(array, chips=tuple(chip for chip in chips if len(chip.axes)))
@@ -125,10 +125,6 @@ def _of_living_channels(problem: RateProblem) -> tuple[RateProblem, dict[str, st
     bias = None if problem.bias_std is None else problem.bias_std[alive]
     reduced = replace(problem, array=fewer, readings=readings, noise_std=noise, bias_std=bias)
     return reduced, dict(zip(fewer.channels, living, strict=True))
-
-
-def _length_scale(array: AccelerometerArray) -> NDArray[np.float64]:
-    return np.array([array.length_unit] * 3 + [1.0] * 3)
 
 
 def _renamed(report: dict[str, Any], names: Mapping[str, str]) -> dict[str, Any]:

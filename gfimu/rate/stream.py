@@ -27,16 +27,7 @@ from gfimu.recording.checks import examine
 from gfimu.recording.quantities import GYRO_COLUMNS, READING_UNITS
 from gfimu.recording.tables.column_file import head_line
 
-__all__ = [
-    "LiveSample",
-    "SkippedLine",
-    "StreamLayout",
-    "StreamSample",
-    "examined_lines",
-    "filter_stream",
-    "read_head",
-    "stream_samples",
-]
+__all__ = ["LiveSample", "SkippedLine", "examined_lines", "filter_stream", "read_head", "stream_samples"]
 
 _START_S = 3.0  # of a stream, which are examined
 _FEWEST, _MOST = 50, 5000  # numerical: samples of that start, whatever the rate

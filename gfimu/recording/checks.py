@@ -29,15 +29,7 @@ from gfimu.recording.evidence.rigid import Evidence, Otherwise
 from gfimu.recording.evidence.ways import TIME_UNITS, time_text
 from gfimu.recording.recording import Recording
 
-__all__ = [
-    "Finding",
-    "check_recording",
-    "dead_channels",
-    "examine",
-    "noisy_channels",
-    "refuse_or_warn",
-    "without_dead_channels",
-]
+__all__ = ["Finding", "check_recording", "examine", "noisy_channels", "refuse_or_warn", "without_dead_channels"]
 
 _FEWEST = 50  # samples
 _LEAST_NOISE = 0.3  # of the data sheet's: from that on a channel surely has noise of its own

@@ -95,7 +95,7 @@ def read_mimu4444(path: str | Path) -> Recording:
     >>> gfimu.read_mimu4444("stream.bin")  # doctest: +SKIP
     """
     file = as_path(path)
-    packets = _decode(_read_bytes(file))
+    packets = _decode(np.frombuffer(read_bytes(file, grows=_GROWS), dtype=np.uint8))
     if packets is None:
         raise InputError(f"{file}: no valid MIMU4444 packet; give the raw serial stream (.bin or .bin.gz)")
     elapsed = _unwrapped(packets.ticks, 32)
@@ -128,10 +128,6 @@ def read_mimu4444(path: str | Path) -> Recording:
             for place, axis in enumerate(_GYRO_AXES)
         },
     )
-
-
-def _read_bytes(file: Path) -> NDArray[np.uint8]:
-    return np.frombuffer(read_bytes(file, grows=_GROWS), dtype=np.uint8)
 
 
 def _decode(stream: NDArray[np.uint8]) -> _Packets | None:

@@ -85,10 +85,10 @@ class AllanDeviation(Declared):
         return self.minimum[1] / FLICKER_FLOOR
 
 
-def averaging_factors(n: int, *, per_decade: int = _PER_DECADE) -> NDArray[np.int64]:
+def averaging_factors(n: int) -> NDArray[np.int64]:
     """Averaging factors on a logarithmic grid, from 1 to a ninth of the series."""
     largest = max(n // _FEWEST, 1)
-    count = int(np.ceil(np.log10(largest) * per_decade)) + 1
+    count = int(np.ceil(np.log10(largest) * _PER_DECADE)) + 1
     return np.unique(np.round(np.geomspace(1, largest, max(count, 1))).astype(np.int64))
 
 

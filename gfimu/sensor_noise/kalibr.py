@@ -10,7 +10,7 @@ from gfimu.sensor_noise.recording_noise import RecordingNoise
 __all__ = ["kalibr_yaml"]
 
 
-def kalibr_yaml(noise: RecordingNoise, *, topic: str = "/imu0") -> str:
+def kalibr_yaml(noise: RecordingNoise) -> str:
     """Return the text of Kalibr's ``imu.yaml``.
 
     ``accelerometer_noise_density`` is N (m/s²/√Hz) and ``accelerometer_random_walk`` is K (m/s³/√Hz, the same as
@@ -21,8 +21,6 @@ def kalibr_yaml(noise: RecordingNoise, *, topic: str = "/imu0") -> str:
     ----------
     noise : RecordingNoise
         Noise in m/s².
-    topic : str
-        ROS topic to name.
 
     Raises
     ------
@@ -44,5 +42,5 @@ def kalibr_yaml(noise: RecordingNoise, *, topic: str = "/imu0") -> str:
         lines.append(f"{kind}_random_walk: {np.sqrt(np.mean(np.square(walks))):.6e}  # {walk_unit}{note}")
     if not noise.gyros:
         lines.append("# the recording has no gyro: add gyroscope_noise_density and gyroscope_random_walk")
-    lines += [f"rostopic: {topic}", f"update_rate: {noise.rate:.6g}  # Hz"]
+    lines += ["rostopic: /imu0", f"update_rate: {noise.rate:.6g}  # Hz"]
     return "\n".join(lines) + "\n"

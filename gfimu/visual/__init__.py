@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from gfimu.visual.plots import Line, Plot
     from gfimu.visual.run import write_run
     from gfimu.visual.run_plots import free_rate_plots
-    from gfimu.visual.scene import Body, Box, Cylinder, Mesh, Names, Path, Pointers, Scene, SensingArrows
+    from gfimu.visual.scene import Box, Cylinder, Mesh, Names, Pointers
 else:
     __getattr__, __dir__, __all__ = declared_names(
         __name__, needs=("a rerun recording", "rerun"), without=("PAGE", "ExpectedDrift", "KnownMotion")

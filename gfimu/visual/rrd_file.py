@@ -27,7 +27,6 @@ def write_rrd(
     scene: Scene,
     plots: Iterable[Plot | PositionTrace],
     notes: str = "",
-    playback_speed: float = 1.0,
 ) -> None:
     """Write a rerun recording with its blueprint, whole or not at all.
 
@@ -43,8 +42,6 @@ def write_rrd(
         What to write.
     notes : str
         Markdown shown in the notes view.
-    playback_speed : float
-        Speed at which the viewer plays, 1 for real time.
 
     Raises
     ------
@@ -53,7 +50,7 @@ def write_rrd(
     """
     RERUN.check_suffix(Path(path))
     panel = rrb.TimePanel(
-        state="collapsed", timeline=TIMELINE, playback_speed=playback_speed, play_state="playing", loop_mode="all"
+        state="collapsed", timeline=TIMELINE, playback_speed=1.0, play_state="playing", loop_mode="all"
     )
     blueprint = rrb.Blueprint(
         layout,

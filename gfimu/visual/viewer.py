@@ -14,15 +14,7 @@ from typing import Any
 
 from gfimu.base.errors import GfimuError, InputError, system_errors
 
-__all__ = [
-    "check_display",
-    "has_display",
-    "open_viewer",
-    "quiet_sdk",
-    "viewer_command",
-    "viewer_listens",
-    "viewer_stream",
-]
+__all__ = ["check_display", "open_viewer", "quiet_sdk", "viewer_command", "viewer_listens", "viewer_stream"]
 
 LOOPBACK = "127.0.0.1"
 """The viewer's own default is 0.0.0.0: every machine on the network could read along and send."""

@@ -1,4 +1,4 @@
-"""The catalogue of effects: every effect that a scenario may have, where it acts, and what was computed of it.
+"""The catalogue of effects: every effect that a scenario may have, and what was computed of it.
 
 The numbers are made by ``docs/scripts/make_effect_catalogue.py`` and stored with the models.
 """
@@ -23,17 +23,7 @@ from sim.effects.registry import (
 )
 from sim.effects.unknown import Unknown
 
-__all__ = ["PLACES", "essence", "every_effect", "place_of"]
-
-PLACES = {
-    "geometry": "where chips, axes and the table are",
-    "motion": "how the table and the array move",
-    "gravity": "what gravity adds along each axis",
-    "sensing": "from the specific force to the analogue reading, in each chip",
-    "sampling": "when chips and the reference are read, and what the reference reads",
-    "data": "noise, and the samples in the file",
-}
-"""Places in the chain, in its order, and what is there."""
+__all__ = ["essence", "every_effect"]
 
 _LEGEND = {
     "f": "reading before the effect",
@@ -60,10 +50,6 @@ _SEEN, _SEPARATED = 4.8, 12.0
 """Size in standard deviations from which an effect shows, and nats from which two are separable, as the diagnosis has
 them: `gfimu.diagnosis` stands above this room, and a test compares the two."""
 
-_OF_GRAVITY = frozenset({"gravity", "table_tilt"})
-_PLACE = {"timing": "sampling", "reference": "sampling", "noise": "data"}
-_MOVING = frozenset({"bearing_shake", "bench_sway", "centrifugal_flex"})
-
 
 def every_effect() -> dict[str, type[Effect]]:
     """Return every effect of gfimu by name; of a name that a linear axis has too, that of the table."""
@@ -71,14 +57,6 @@ def every_effect() -> dict[str, type[Effect]]:
     known = {**known, Unknown.name: Unknown}
     first = [*TABLE_EFFECTS, *known]
     return {name: known[name] for name in dict.fromkeys(first)}
-
-
-def place_of(effect: type[Effect]) -> str:
-    """Return where an effect acts: a key of `PLACES`."""
-    if effect.name in _OF_GRAVITY:
-        return "gravity"
-    moves = effect.name in _MOVING or effect.name.startswith("lean_")
-    return "motion" if moves else _PLACE.get(effect.place, effect.place)
 
 
 def essence(effect: type[Effect]) -> str:

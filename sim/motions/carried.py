@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,10 +12,11 @@ from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
 
 from gfimu.base.errors import InputError
+from gfimu.base.files.schema import NotNegative, Positive, Table, about
 from gfimu.model import world_model
-from sim.motions.motion import BodyState, SpinMotion
+from sim.motions.motion import BodyMotion, BodyState, SpinMotion
 
-__all__ = ["Carriage", "Hand", "Wheel"]
+__all__ = ["Carriage", "HandTable", "Wheel"]
 
 _AXLE = np.array([0.0, 1.0, 0.0])  # of a wheel, in the world: it rolls along x
 
@@ -109,51 +111,43 @@ class Wheel:
         return out
 
 
-@dataclass(frozen=True)
-class Hand:
-    """A body that a hand turns and moves at random.
+class HandTable(Table, frozen=True, dict=True, tag_field="kind", tag="hand"):
+    """A hand turns and moves a body at random, with rests at both ends."""
 
-    Euler angles (z, y, x) and the place are quintic splines through random knots, at rest at first and at the end.
+    # Euler angles (z, y, x) and the place are quintic splines through random knots, at rest at first and at the end; a
+    # hand needs about half a second there and back.
+    duration_s: Annotated[Positive, about("Length of the motion.", "s", example=40.0)]
+    turn_rad: Annotated[NotNegative, about("Rms of the angles.", "rad")] = 0.7
+    sway_m: Annotated[NotNegative, about("Rms of the place along each axis.", "m")] = 0.15
+    pace_s: Annotated[Positive, about("Time between two knots of the motion.", "s")] = 0.4
+    rest_s: Annotated[NotNegative, about("Rest at the start and at the end.", "s")] = 2.0
+    seed: Annotated[int, about("Seed of the motion.")] = 0
 
-    Parameters
-    ----------
-    duration : float
-        Length, s.
-    turn : float
-        Rms of the angles, rad.
-    sway : float
-        Rms of the place along each axis, m.
-    pace : float
-        Time between two knots, s; a hand needs about half a second there and back.
-    rest : float
-        Rest at the start and at the end, s.
-    seed : int
-        Seed of the knots.
-    """
-
-    duration: float
-    turn: float = 0.7
-    sway: float = 0.15
-    pace: float = 0.4
-    rest: float = 2.0
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        if self.pace <= 0 or self.rest < 0 or self.duration < 2.0 * self.rest + 4.0 * self.pace:
+    def motion(self) -> BodyMotion:
+        """Return the motion of the body, which this is; raises `InputError` where the numbers allow none."""
+        if self.duration_s < 2.0 * self.rest_s + 4.0 * self.pace_s:
             raise InputError(
-                f"hand: {self.duration:g} s are too short for rest_s = {self.rest:g} at both ends and a few movements "
-                f"of pace_s = {self.pace:g}; give a longer duration_s"
+                f"hand: {self.duration_s:g} s are too short for rest_s = {self.rest_s:g} at both ends and a few "
+                f"movements of pace_s = {self.pace_s:g}; give a longer duration_s"
             )
-        if not (abs(self.turn) <= _WIDEST and abs(self.sway) <= _WIDEST):
-            raise InputError(f"hand: turn {self.turn:g} rad, sway {self.sway:g} m: give numbers of at most {_WIDEST:g}")
-        if not self.duration / self.pace <= _MOST_KNOTS:
-            raise InputError(f"hand: pace_s = {self.pace:g} gives more than {_MOST_KNOTS:g} movements; move slower")
+        if not (self.turn_rad <= _WIDEST and self.sway_m <= _WIDEST):
+            raise InputError(
+                f"hand: turn {self.turn_rad:g} rad, sway {self.sway_m:g} m: give numbers of at most {_WIDEST:g}"
+            )
+        if not self.duration_s / self.pace_s <= _MOST_KNOTS:
+            raise InputError(f"hand: pace_s = {self.pace_s:g} gives more than {_MOST_KNOTS:g} movements; move slower")
+        return self
+
+    @property
+    def length(self) -> float:
+        """Length of the motion, s."""
+        return self.duration_s
 
     @cached_property
     def _spline(self):  # type: ignore[no-untyped-def]
-        count = int((self.duration - 2.0 * self.rest) / self.pace) + 1
-        times = np.linspace(self.rest, self.duration - self.rest, count)
-        knots = np.random.default_rng(self.seed).standard_normal((count, 6)) * ([self.turn] * 3 + [self.sway] * 3)
+        count = int((self.duration_s - 2.0 * self.rest_s) / self.pace_s) + 1
+        times = np.linspace(self.rest_s, self.duration_s - self.rest_s, count)
+        knots = np.random.default_rng(self.seed).standard_normal((count, 6)) * ([self.turn_rad] * 3 + [self.sway_m] * 3)
         knots[[0, -1]] = 0.0
         flat = [(1, np.zeros(6)), (2, np.zeros(6))]
         return make_interp_spline(times, knots, k=5, bc_type=(flat, flat))
@@ -161,8 +155,8 @@ class Hand:
     def at(self, t: ArrayLike) -> BodyState:
         """State of the body at times ``t``, s, shape (n,)."""
         times = np.asarray(t, dtype=float)
-        moving = np.clip(times, self.rest, self.duration - self.rest)
-        inside = ((times > self.rest) & (times < self.duration - self.rest))[:, None]
+        moving = np.clip(times, self.rest_s, self.duration_s - self.rest_s)
+        inside = ((times > self.rest_s) & (times < self.duration_s - self.rest_s))[:, None]
         value, slope, bend = self._spline(moving), *(self._spline(moving, order) * inside for order in (1, 2))
         omega, alpha = _euler_rates(value[:, :3], slope[:, :3], bend[:, :3])
         turned = Rotation.from_euler("ZYX", value[:, :3]).as_matrix()

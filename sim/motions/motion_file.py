@@ -9,22 +9,12 @@ from __future__ import annotations
 from typing import Annotated, Literal
 
 from gfimu.base.files.schema import NotNegative, Positive, Table, Triple, about
-from sim.motions.carried import Carriage, Hand, Wheel
+from sim.motions.carried import Carriage, HandTable, Wheel
 from sim.motions.motion import BodyMotion, SpinMotion
 from sim.motions.pose_sequence import PoseSequence
 from sim.motions.profiles import Chirp, Hold, Ramp, Segment, Sine, Tumble, spin_profile
 
-__all__ = [
-    "CarriageTable",
-    "HandTable",
-    "MotionTable",
-    "PosesTable",
-    "ProfileTable",
-    "RestTable",
-    "SegmentTable",
-    "TumbleTable",
-    "WheelTable",
-]
+__all__ = ["MotionTable", "ProfileTable"]
 
 _Duration = Annotated[Positive, about("Length.", "s", example=1.0)]
 _Amplitude = Annotated[float, about("Amplitude of the rate.", "rad/s", example=1.0)]
@@ -255,26 +245,6 @@ class CarriageTable(Table, frozen=True, tag_field="kind", tag="carriage"):
     def length(self) -> float:
         """Length of all segments, s."""
         return sum(table.duration_s for table in self.segment)
-
-
-class HandTable(Table, frozen=True, tag_field="kind", tag="hand"):
-    """A hand turns and moves a body at random, with rests at both ends."""
-
-    duration_s: Annotated[Positive, about("Length of the motion.", "s", example=40.0)]
-    turn_rad: Annotated[NotNegative, about("Rms of the angles.", "rad")] = Hand.turn
-    sway_m: Annotated[NotNegative, about("Rms of the place along each axis.", "m")] = Hand.sway
-    pace_s: Annotated[Positive, about("Time between two knots of the motion.", "s")] = Hand.pace
-    rest_s: Annotated[NotNegative, about("Rest at the start and at the end.", "s")] = Hand.rest
-    seed: Annotated[int, about("Seed of the motion.")] = Hand.seed
-
-    def motion(self) -> BodyMotion:
-        """Return the motion of the body."""
-        return Hand(self.duration_s, self.turn_rad, self.sway_m, self.pace_s, self.rest_s, self.seed)
-
-    @property
-    def length(self) -> float:
-        """Length of the motion, s."""
-        return self.duration_s
 
 
 MotionTable = ProfileTable | RestTable | TumbleTable | PosesTable | WheelTable | CarriageTable | HandTable

@@ -25,9 +25,7 @@ _USER_NUMBERS = ("body", "jnt", "geom", "site", "cam", "tendon", "actuator", "se
 _SAME_PLACE = 1e-6  # sites nearer than this belong to one chip, m
 
 
-def array_from_mjcf(
-    path: str | Path, *, body: str | None = None, sites: str = "*", part: str = "adxl345"
-) -> AccelerometerArray:
+def array_from_mjcf(path: str | Path, *, body: str | None = None, sites: str = "*") -> AccelerometerArray:
     """Read an accelerometer array from the sites of an MJCF file.
 
     Sites at one point make one chip; a chip has up to three sensing axes, in the order of the compiled
@@ -41,8 +39,6 @@ def array_from_mjcf(
         Body whose frame is the array's; by default the one that carries all the sites, nearest to them.
     sites : str
         Pattern of the names of the sites that are sensing axes, such as ``"a??"``.
-    part : str
-        Part of the chips.
 
     Raises
     ------
@@ -85,7 +81,7 @@ def array_from_mjcf(
     return AccelerometerArray(
         name=file.stem,
         chips=tuple(
-            _chip(file, number, [site_names[i] for i in chip], positions[chip[0]], axes[chip], part)
+            _chip(file, number, [site_names[i] for i in chip], positions[chip[0]], axes[chip])
             for number, chip in enumerate(chips, start=1)
         ),
         length_unit=float(np.abs(positions).max()) or 1.0,
@@ -112,13 +108,13 @@ def _bare(spec: mujoco.MjSpec) -> mujoco.MjSpec:
     return spec
 
 
-def _chip(file: Path, number: int, names: Sequence[str], position: np.ndarray, axes: np.ndarray, part: str) -> Chip:
+def _chip(file: Path, number: int, names: Sequence[str], position: np.ndarray, axes: np.ndarray) -> Chip:
     """Build a chip from the sites at one point, named by what their names share."""
     if len(names) > 3:
         raise InputError(f"{file}: sites {', '.join(names)} share a point; a chip has at most three sensing axes")
     stem = names[0][:-1]
     regular = list(names) == [f"{stem}{axis}" for axis in range(1, len(names) + 1)]
-    return Chip(stem if regular and stem and re.fullmatch(CHIP_NAME, stem) else f"a{number}", position, axes, part)
+    return Chip(stem if regular and stem and re.fullmatch(CHIP_NAME, stem) else f"a{number}", position, axes)
 
 
 def _frame_body(model: mujoco.MjModel, file: Path, body: str | None, sites: Sequence[int]) -> int:

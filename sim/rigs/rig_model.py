@@ -21,7 +21,6 @@ __all__ = [
     "SPIN_JOINT",
     "across_axis",
     "channel_places",
-    "free_model",
     "free_spec",
     "nod_axis",
     "turntable_model",
@@ -43,12 +42,6 @@ def turntable_model(world: World) -> mujoco.MjModel:
     linear axis the table slides.
     """
     return turntable_spec(world).compile()
-
-
-@mujoco_warnings()
-def free_model(world: World) -> mujoco.MjModel:
-    """Compile the free cube of ``models/mjcf/free_cube.xml`` with the chips and the gravity of a world."""
-    return free_spec(world).compile()
 
 
 def turntable_spec(world: World, file: str = "turntable") -> mujoco.MjSpec:

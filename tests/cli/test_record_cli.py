@@ -8,16 +8,16 @@ import os
 import subprocess
 import sys
 import time
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from firmware_bridge import FORMATS
-from firmware_bridge.loop import board_process
 from gfimu.recording import Recording
 
-pytestmark = pytest.mark.skipif(not board_process.emulator_available(), reason="the emulator is in the extra")
+pytestmark = pytest.mark.skipif(find_spec("unicorn") is None, reason="the emulator is in the extra")
 GFIMU = Path(sys.executable).parent / "gfimu"
 
 

@@ -66,7 +66,6 @@ class ChipWatch(Watch):
     """Follows the chip-selects and the words between them."""
 
     peripherals = frozenset({"gpio", "ssp1"})
-    rules = (FAST, MODE, SIZE, TWO, NOBODY, CUT, STALE, REST, MULTIPLE, STANDBY, TORN, SLOW, POP, REGISTER)
 
     def reset(self) -> None:
         """No chip selected."""

@@ -69,7 +69,6 @@ class ClockWatch(Watch):
     """Follows the set-up of the clocks step by step."""
 
     peripherals = frozenset({"syscon"})
-    rules = (OSCILLATOR, PLL_RANGE, PLL_FEED, PLL_LOCK, PLL_STEPS, CCLK, FLASH, FLASH_LATE, PCLKSEL, RESERVED_BITS)
 
     def reset(self) -> None:
         """Start on the internal oscillator."""
@@ -209,8 +208,6 @@ _FEEDS = {_BASE + _PLL0FEED: PLL_FEED, _BASE + 0x0AC: PLL_FEED, _WATCHDOG_BASE +
 
 class FeedWatch(Watch):
     """Looks at the two writes of a feed sequence, and at what comes between them."""
-
-    rules = (PLL_FEED, WATCHDOG_FEED)
 
     def reset(self) -> None:
         """No sequence begun."""

@@ -8,7 +8,7 @@ from firmware_bridge.board.cpu import AHB_RAM_BASE, AHB_RAM_SIZE, RAM_BASE, RAM_
 from firmware_bridge.lpc1768.elf import ElfImage
 from firmware_bridge.strict.findings import Ledger, Place, Rule, Severity
 
-__all__ = ["IMAGE_RULES", "judge_image"]
+__all__ = ["judge_image"]
 
 CHECKSUM = Rule(
     "boot_checksum",
@@ -23,7 +23,6 @@ VECTORS = Rule(
     "ARMv7-M ARM B1.5.3",
 )
 PROTECTION = Rule("code_protection", "reserve flash word 0x2FC in the linker script as 0xFFFFFFFF", "UM10360 32.6")
-IMAGE_RULES = (CHECKSUM, VECTORS, PROTECTION)
 
 _PROTECTION_AT = 0x2FC
 _PROTECTION_CODES = {0x12345678: "CRP1", 0x87654321: "CRP2", 0x43218765: "CRP3", 0x4E697370: "NO_ISP"}

@@ -43,7 +43,6 @@ class InterruptWatch(Watch):
     """Looks at what is enabled, entered and left."""
 
     peripherals = frozenset({"nvic"})
-    rules = (NO_HANDLER, PRIORITY, STORM, DEAD, DEEP_SLEEP, RESERVED_BITS)
 
     def reset(self) -> None:
         """Nothing enabled."""

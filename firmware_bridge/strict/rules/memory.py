@@ -43,8 +43,6 @@ _HALF_ACCESSES = ((0xF000, 0x8000), (0xFE00, 0x5200), (0xFE00, 0x5A00), (0xFE60,
 class StackWatch(Watch):
     """Follows the main stack down to the data below it."""
 
-    rules = (OVERFLOW, LOW)
-
     def reset(self) -> None:
         """Begin at the top of the stack."""
         image = self.board.image
@@ -97,8 +95,6 @@ def word_accesses(start: int, code: bytes) -> Iterator[int]:
 class AlignmentWatch(Watch):
     """Looks at accesses that need to be aligned."""
 
-    rules = (UNALIGNED,)
-
     def unaligned(self, address: int) -> None:
         """Note an instruction that the processor does not execute at this address."""
         self.report(UNALIGNED, f"several words at {address:#010x}: a usage fault")
@@ -119,8 +115,6 @@ class AlignmentWatch(Watch):
 
 class RegisterWatch(Watch):
     """Looks for accesses to places where no register is, or to a part of one."""
-
-    rules = (RESERVED, PART)
 
     def before(self, access: Access) -> None:
         """Look at the register."""

@@ -78,8 +78,6 @@ def pin_function(pincon: dict[int, int], port: int, pin: int) -> int:
 class PowerWatch(Watch):
     """Looks for accesses to peripherals without power."""
 
-    rules = (UNPOWERED,)
-
     def before(self, access: Access) -> None:
         """Look at the peripheral's bit."""
         bit = _POWER_BITS.get(access.address & ~_SLOT)
@@ -90,7 +88,6 @@ class PowerWatch(Watch):
 class PinWatch(Watch):
     """Looks, when a peripheral sends or receives, whether its pins are its own."""
 
-    rules = (PIN, PIN_INPUT)
     peripherals = frozenset({"pincon", *_NAMES.values()})
 
     def reset(self) -> None:
@@ -141,7 +138,6 @@ class GpioWatch(Watch):
     """Looks for pins that are moved but can't move."""
 
     peripherals = frozenset({"gpio", "pincon"})
-    rules = (NOT_OUTPUT, OTHER_FUNCTION)
 
     def reset(self) -> None:
         """No latch was written."""

@@ -42,7 +42,6 @@ class UartWatch(Watch):
     """Looks at the speed when a UART sends, and at its FIFOs."""
 
     peripherals = frozenset({"uart0", "uart1", "uart2", "uart3"})
-    rules = (DIVISOR, BAUD, DLAB, WORD, PARITY, NO_FIFO, READ_EMPTY, WRITE_FULL)
 
     def reset(self) -> None:
         """Nothing sent."""

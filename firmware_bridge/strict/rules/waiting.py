@@ -46,8 +46,6 @@ class _Poll:
 class WaitWatch(Watch):
     """Looks for a register that is read over and over and does not change."""
 
-    rules = (UNBOUNDED, OUTSIDE)
-
     def reset(self) -> None:
         """Nobody waits."""
         self._polled: dict[int, _Poll] = {}

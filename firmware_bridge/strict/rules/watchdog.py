@@ -29,7 +29,6 @@ class WatchdogWatch(Watch):
     """Looks at each feed and at the time that was left."""
 
     peripherals = frozenset({"watchdog"})
-    rules = (RESET, LATE, NO_RESET, NOT_STARTED)
 
     def reset(self) -> None:
         """Off."""

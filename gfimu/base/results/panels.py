@@ -82,14 +82,10 @@ class Panel:
         return isinstance(self.x, tuple)
 
 
-def axis_series(
-    values: NDArray[np.float64], std: NDArray[np.float64] | None = None, *, names: Sequence[str] = ("x", "y", "z")
-) -> tuple[Series, ...]:
+def axis_series(values: NDArray[np.float64], std: NDArray[np.float64] | None = None) -> tuple[Series, ...]:
     """Return the components of vectors (n, 3), each in the colour of its axis, with standard deviations (n, 3)."""
-    return tuple(
-        Series(name, values[:, place], None if std is None else std[:, place], role="xyz"[place])
-        for place, name in enumerate(names)
-    )
+    parts = [None] * 3 if std is None else std.T
+    return tuple(Series(name, value, part, role=name) for name, value, part in zip("xyz", values.T, parts, strict=True))
 
 
 def one_row(values: Mapping[str, object]) -> dict[str, NDArray[Any]]:

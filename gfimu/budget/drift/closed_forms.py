@@ -35,15 +35,12 @@ from gfimu.base.short_repr import short_repr
 from gfimu.base.units import STANDARD_GRAVITY
 
 __all__ = [
-    "AttitudeGrowth",
     "ErrorSources",
     "accumulated_covariance",
     "attitude_growth",
     "position_error",
-    "position_from_alpha",
     "position_from_bias",
     "position_from_impulse",
-    "position_from_p",
     "position_from_rate",
 ]
 

@@ -15,7 +15,7 @@ from gfimu.budget.drift.closed_forms import ErrorSources, position_from_bias, po
 __all__ = ["drift_weight"]
 
 
-def drift_weight(time: float, sources: ErrorSources, *, gravity: float = STANDARD_GRAVITY) -> NDArray[np.float64]:
+def drift_weight(time: float, sources: ErrorSources) -> NDArray[np.float64]:
     """Return W, shape (6, 6): tr(W C) is the sum of the three variances of the position of a unit at rest, m².
 
     First order, without the mean fall by tilt and without the drift of a rate from elsewhere, which no array changes.
@@ -26,13 +26,13 @@ def drift_weight(time: float, sources: ErrorSources, *, gravity: float = STANDAR
         Time since the start of navigation, s.
     sources : ErrorSources
         Errors of the channels: bias, noise density and random walk of the bias.
-    gravity : float
-        Magnitude of gravity, m/s².
     """
     nodes, weights = np.polynomial.legendre.leggauss(8)  # exact for the polynomials at rest, up to t⁸ (degree 15)
     tau, width = 0.5 * time * (nodes + 1.0), 0.5 * time * weights
-    constant = position_from_bias(time, 0.0, 0j, gravity)  # (3, 6)
-    impulse, step = (of(tau, 0.0, 0j, gravity) for of in (position_from_impulse, position_from_bias))  # (m, 3, 6)
+    constant = position_from_bias(time, 0.0, 0j, STANDARD_GRAVITY)  # (3, 6)
+    impulse, step = (
+        of(tau, 0.0, 0j, STANDARD_GRAVITY) for of in (position_from_impulse, position_from_bias)
+    )  # (m, 3, 6)
     white = np.einsum("m,mij,mik->jk", width, impulse, impulse)
     walking = np.einsum("m,mij,mik->jk", width, step, step)
     return np.asarray(

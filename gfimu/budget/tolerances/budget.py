@@ -138,15 +138,12 @@ class ToleranceBudget:
 
     Parameters
     ----------
-    calibration : str
-        A key of `gfimu.budget.tolerances.calibrated.CALIBRATIONS`.
     quantities : mapping of str to QuantityBudget
         By name; without the rate from the null space where that does not determine it.
     attitude_rad : float
         Attitude error at the end, root mean square per axis, rad: how far first order can be trusted.
     """
 
-    calibration: str
     quantities: Mapping[str, QuantityBudget]
     attitude_rad: float
 
@@ -203,7 +200,7 @@ def tolerance_budget(
             whole, spread = end[_END[name]], noise_end[_END[name], _END[name]]
         quantities[name] = _quantity(name, _by_cause(whole, left), spread, samples.get(name, 0))
     turned = np.sum(end[_END["attitude"]] ** 2) + np.trace(noise_end[_END["attitude"], _END["attitude"]])
-    return ToleranceBudget(calibration, quantities, math.sqrt(float(turned) / 3.0))
+    return ToleranceBudget(quantities, math.sqrt(float(turned) / 3.0))
 
 
 def _by_cause(whole: Floats, left: Remaining) -> dict[str, Floats]:

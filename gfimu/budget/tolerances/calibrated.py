@@ -31,7 +31,6 @@ from gfimu.recording import Recording
 
 __all__ = [
     "CALIBRATIONS",
-    "LEAST_REST_S",
     "Poses",
     "Remaining",
     "calibrations_of",
@@ -91,15 +90,12 @@ class Remaining:
 
     Parameters
     ----------
-    calibration : str
-        A key of `CALIBRATIONS`.
     signatures : mapping of str to ndarray, shape (n, c, m)
         By cause, of one standard deviation of each of m independent parameters, m/s².
     rest : int
         Number of samples from the start whose mean is taken off the readings; 0 for none.
     """
 
-    calibration: str
     signatures: Mapping[str, Floats]
     rest: int
 
@@ -174,7 +170,7 @@ def remaining(
     if rest:
         found = {name: columns - columns[:rest].mean(axis=0) for name, columns in found.items()}
     found = {name: columns for name, columns in found.items() if np.abs(columns).max() > _NEGLIGIBLE}
-    return Remaining(calibration, found, rest)
+    return Remaining(found, rest)
 
 
 def _after_poses(
@@ -192,15 +188,11 @@ def _after_poses(
         # x θ_i θ_jᵀ turns the chip by x/2 θ_i × θ_j; the rest of it is fitted.
         turns = [0.5 * tolerances.cross_axis[i] * np.cross(array.axes[i], array.axes[j]) for i, j in axis_pairs(array)]
         left["cross-axis"] = np.einsum("nci,mi->ncm", turned, np.array(turns))
-    posterior = poses.posterior(array, np.maximum(tolerances.noise, _least_noise(tolerances)), motion.gravity)
+    least = max(1e-3 * float(tolerances.noise.max()), 1e-6)  # m/s²: the fit needs a weight where no noise is stated
+    posterior = poses.posterior(array, np.maximum(tolerances.noise, least), motion.gravity)
     if tolerances.noise.any():
         left["calibration"] = _of_posterior(posterior, array, motion)
     return left
-
-
-def _least_noise(tolerances: Tolerances) -> float:
-    """Return a noise that the fit can be weighted with where the stated one is zero, m/s²."""
-    return max(1e-3 * float(tolerances.noise.max()), 1e-6)
 
 
 def _of_posterior(posterior: Calibration, array: AccelerometerArray, motion: KnownMotion) -> Floats:

@@ -27,17 +27,7 @@ from gfimu.base.errors import InputError
 from gfimu.base.files.atomic_file import write_text
 from gfimu.base.results import TableResult, columns_of, text_column
 
-__all__ = [
-    "FORMAT",
-    "FORMAT_VERSION",
-    "Certificate",
-    "ChipCertificate",
-    "Comparison",
-    "ComparisonRow",
-    "Component",
-    "Sheet",
-    "Term",
-]
+__all__ = ["FORMAT", "Certificate", "ChipCertificate", "Comparison", "ComparisonRow", "Component", "Sheet", "Term"]
 
 FORMAT = "gfimu-certificate"
 FORMAT_VERSION = 1

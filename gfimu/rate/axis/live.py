@@ -120,8 +120,6 @@ class LiveAxisFilter:
         Nominal sample rate, Hz.
     at_rest : bool
         Whether the body is at rest at the first sample; else both signs of the rate are followed until one is clear.
-    settings : LiveAxisSettings
-        How the filter runs.
 
     Raises
     ------
@@ -129,17 +127,9 @@ class LiveAxisFilter:
         If the array can't see the rotation.
     """
 
-    def __init__(
-        self,
-        array: AccelerometerArray,
-        axis: TurningAxis,
-        rate_hz: float,
-        *,
-        at_rest: bool = True,
-        settings: LiveAxisSettings = LiveAxisSettings(),
-    ) -> None:
+    def __init__(self, array: AccelerometerArray, axis: TurningAxis, rate_hz: float, *, at_rest: bool = True) -> None:
         require_visible(array, axis)
-        self.array, self.axis, self.settings = array, axis, settings
+        self.array, self.axis, self.settings = array, axis, LiveAxisSettings()
         self._at_rest = at_rest
         self._channels = AxisChannels.of(array, axis)
         self._noise = np.ascontiguousarray(np.broadcast_to(white_noise_std(array, rate_hz), array.n_channels))

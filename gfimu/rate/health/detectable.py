@@ -136,14 +136,7 @@ def detectable_faults(
     )  # fmt: skip
 
 
-def least_fault(
-    n_channels: int,
-    noise_std: float,
-    sample_rate: float,
-    *,
-    duration: float = 1.0,
-    policy: MonitorPolicy | None = None,
-) -> float:
+def least_fault(n_channels: int, noise_std: float, sample_rate: float, *, duration: float = 1.0) -> float:
     """Return the least fault that is detected on a channel that the others predict exactly, m/s².
 
     With equal white noise on all channels and a known rate, (2) is this over √(1 − h_i), with h_i the leverage of
@@ -159,10 +152,8 @@ def least_fault(
         Samples per second, Hz.
     duration : float
         Time since the onset, s.
-    policy : MonitorPolicy, optional
-        Threshold and biases.
     """
-    policy = policy or MonitorPolicy()
+    policy = MonitorPolicy()
     samples = max(1.0, duration * sample_rate)
     bias = policy.bias_std**2 + 0.5 * policy.bias_walk * duration
     threshold = policy.threshold(n_channels, policy.samples(1.0 / sample_rate) / sample_rate)

@@ -112,16 +112,6 @@ class ChannelMonitor:
         self.noise_in_motion = True
 
     @property
-    def noise_of_means(self) -> NDArray[np.float64]:
-        """Standard deviation that white noise gives the mean of a block, shape (c,), m/s²."""
-        return self.follower.noise_of_means
-
-    @property
-    def null_count(self) -> int:
-        """Directions of the null space with all channels."""
-        return self.follower.tables.n_null
-
-    @property
     def largest_statistic(self) -> float:
         """Largest statistic of a channel so far; those far below the threshold are not followed."""
         return float(self.follower.state.largest[0])

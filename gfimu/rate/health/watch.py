@@ -113,7 +113,6 @@ def watch_in_motion(
     errors: SensorErrors,
     *,
     omega0: ArrayLike | None,
-    policy: MonitorPolicy | None = None,
 ) -> ChannelHealth | None:
     """Find the faulty channels of a recording that begins in motion, from when the rate filter has settled on.
 
@@ -126,7 +125,7 @@ def watch_in_motion(
     InputError
         As `watch_channels`.
     """
-    settings = policy or MonitorPolicy()
+    settings = MonitorPolicy()
     if array.n_channels - 7 < settings.fewest_null:
         return None
     times, rows = np.asarray(t, dtype=float), np.asarray(readings, dtype=float)
@@ -167,12 +166,7 @@ def _concerned(
 
 
 def watch_from_rest(
-    array: AccelerometerArray,
-    t: ArrayLike,
-    readings: ArrayLike,
-    errors: SensorErrors,
-    *,
-    policy: MonitorPolicy | None = None,
+    array: AccelerometerArray, t: ArrayLike, readings: ArrayLike, errors: SensorErrors
 ) -> ChannelHealth | None:
     """Find the faulty channels of a recording that starts at rest, with the biases that this rest shows taken off.
 
@@ -185,7 +179,7 @@ def watch_from_rest(
     InputError
         As `watch_channels`.
     """
-    settings = policy or MonitorPolicy()
+    settings = MonitorPolicy()
     if array.n_channels - 7 < settings.fewest_null:
         return None
     times = np.asarray(t, dtype=float)

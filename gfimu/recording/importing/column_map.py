@@ -21,7 +21,6 @@ __all__ = [
     "UNMAPPED",
     "ColumnMap",
     "ColumnSpec",
-    "DropKind",
     "TextSpec",
     "TimeSpec",
     "list_maps",

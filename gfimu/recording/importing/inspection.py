@@ -16,7 +16,7 @@ from gfimu.base.declared import table as table_of
 from gfimu.base.errors import InputError, one_line
 from gfimu.base.results import TableResult, columns_of, text_column
 from gfimu.recording.importing.clock import Times, times_of
-from gfimu.recording.importing.column_map import ColumnMap, TextSpec, TimeSpec, map_toml
+from gfimu.recording.importing.column_map import ColumnMap, TimeSpec, map_toml
 from gfimu.recording.importing.guessing.likely_reference import likely_references
 from gfimu.recording.importing.guessing.suggestion import roles_by_map, suggest, with_shipped
 from gfimu.recording.importing.oddities import oddities
@@ -127,7 +127,7 @@ class Inspection(Declared, TableResult):
         return self.findings
 
 
-def inspect_file(path: str | Path | ArrowStream, *, table: str = "", text: TextSpec = TextSpec()) -> Inspection:
+def inspect_file(path: str | Path | ArrowStream, *, table: str = "") -> Inspection:
     """Look at a file of unknown layout.
 
     Parameters
@@ -136,15 +136,13 @@ def inspect_file(path: str | Path | ArrowStream, *, table: str = "", text: TextS
         The file, of any format that has a reader, or a table of pandas, polars or pyarrow.
     table : str
         Table of the file to look at; by default the one with the most triads of accelerations.
-    text : TextSpec
-        Layout of a text file, where it is known.
 
     Raises
     ------
     InputError
         If the file can't be read at all, or it is neither a path nor a table.
     """
-    raw = read_foreign(path, text=text) if isinstance(path, str | Path) else table_file(path)
+    raw = read_foreign(path) if isinstance(path, str | Path) else table_file(path)
     widest = max(raw.tables.values(), key=lambda one: len(one.columns))
     if len(widest.columns) > _MOST_COLUMNS or len(raw.tables) > _MOST_TABLES:
         what = f"{len(widest.columns)} columns" if len(widest.columns) > _MOST_COLUMNS else f"{len(raw.tables)} tables"
@@ -155,7 +153,7 @@ def inspect_file(path: str | Path | ArrowStream, *, table: str = "", text: TextS
     own = own_chips(list(plain.columns))
     if own:
         return _own_recording(raw, plain, own)
-    found = suggest(raw, table=table, name=_map_name(raw.source), text=text)
+    found = suggest(raw, table=table, name=Path(raw.source).name.partition(".")[0] or "map")
     fitting = tuple(fitting_maps(raw))
     suggested, reasons = found.column_map, found.reasons
     time, is_rate_known, roles = found.time.spec, found.time.is_rate_known, found.roles
@@ -220,10 +218,6 @@ def _is_reference(name: str) -> bool:
 
 def _rate(times: Times | None) -> float:
     return 1.0 / float(np.median(np.diff(times.t_s))) if times is not None and len(times.t_s) > 1 else float("nan")
-
-
-def _map_name(source: str) -> str:
-    return Path(source).name.partition(".")[0] or "map"
 
 
 def _view(table: RawTable, name: str, role: str) -> ColumnView:

@@ -8,17 +8,7 @@ import re
 from gfimu.base.errors import UnitError
 from gfimu.base.units import STANDARD_GRAVITY
 
-__all__ = [
-    "ACCELERATION",
-    "ANGLE",
-    "RATE",
-    "TEMPERATURE",
-    "TIME",
-    "bracketed_unit",
-    "factor_of",
-    "kind_of",
-    "unit_of_name",
-]
+__all__ = ["RATE", "TIME", "bracketed_unit", "factor_of", "kind_of", "unit_of_name"]
 
 _DEGREE = math.pi / 180.0
 

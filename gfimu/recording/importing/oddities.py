@@ -12,7 +12,6 @@ __all__ = [
     "GARBAGE",
     "LONGEST_EQUAL",
     "RAIL_WIDTH",
-    "DataRail",
     "is_within_range",
     "oddities",
     "rails_of",

@@ -277,7 +277,7 @@ def merged_piece(pieces: Sequence[Piece]) -> Piece:
         )
     t = first.times.t_s[rows]
     channels = {name: values[rows] for name, values in first.channels.items()}
-    chips = _chips(first.channels)
+    chips = list(dict.fromkeys(name[:-1] for name in first.channels))
     notes = list(first.times.notes)
     for number, (piece, shift) in enumerate(zip(pieces[1:], shifts[1:], strict=True), start=1):
         notes += piece.times.notes
@@ -292,10 +292,6 @@ def merged_piece(pieces: Sequence[Piece]) -> Piece:
         {name: values[rows] for name, values in first.reference.items()},
         {name: values[rows] for name, values in first.other.items()},
     )
-
-
-def _chips(channels: Mapping[str, Any]) -> list[str]:
-    return list(dict.fromkeys(name[:-1] for name in channels))
 
 
 def _chip_name(chips: Sequence[str], chip: str, number: int) -> str:

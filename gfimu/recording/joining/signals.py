@@ -168,21 +168,20 @@ class Alignment(Declared):
 
 
 def uniform(
-    t: NDArray[np.float64], values: NDArray[np.float64], step: float, start: float | None = None
+    t: NDArray[np.float64], values: NDArray[np.float64], step: float
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Return values on a uniform grid, (k, c), and where they are read or lie between two steps that are.
 
     They are means of what falls into a step, and on a line between where nothing does.
     """
-    first = t[0] if start is None else start
-    count = int((t[-1] - first) / step) + 1
-    place = np.clip(np.round((t - first) / step).astype(int), 0, count - 1)
+    count = int((t[-1] - t[0]) / step) + 1
+    place = np.clip(np.round((t - t[0]) / step).astype(int), 0, count - 1)
     grid = np.zeros((count, values.shape[1]))
     known = np.zeros(grid.shape, dtype=bool)
     for column, series in enumerate(values.T):
         finite = np.isfinite(series)
         sums = np.bincount(place[finite], series[finite], count)
-        times = np.bincount(place[finite], t[finite] - first, count)
+        times = np.bincount(place[finite], t[finite] - t[0], count)
         numbers = np.bincount(place[finite], minlength=count)
         filled = numbers > 0
         if not filled.any():  # a dead channel: constant, as one that is stuck

@@ -26,16 +26,7 @@ from sim.effects import Effect
 from sim.motions.motion import SpinMotion, SplineSpin
 from sim.twin import Twin
 
-__all__ = [
-    "Block",
-    "Candidate",
-    "FreeDrive",
-    "KnownDrive",
-    "LinearLibrary",
-    "fitted_sizes",
-    "motion_columns",
-    "stated_parameters",
-]
+__all__ = ["Block", "Candidate", "KnownDrive", "LinearLibrary", "fitted_sizes", "motion_columns", "stated_parameters"]
 
 Floats = NDArray[np.float64]
 

@@ -256,11 +256,11 @@ def _is_nothing(one: Judged) -> bool:
     return one.outcome in {"quiet", "false_alarm"} or not one.hidden
 
 
-def summaries(judged: Iterable[Judged], *, together: bool = True) -> list[Summary]:
-    """Return a summary per set and method, in the order of the release; ``together`` adds one of all that are drawn."""
+def summaries(judged: Iterable[Judged]) -> list[Summary]:
+    """Return a summary per set and method, in the order of the release, and one of all that are drawn."""
     groups: dict[tuple[str, str], list[Judged]] = defaultdict(list)
     listed = list(judged)
-    several = together and len({one.set_name for one in listed} - {"real"}) > 1
+    several = len({one.set_name for one in listed} - {"real"}) > 1
     for one in listed:
         groups[one.set_name, one.method].append(one)
         if several and one.set_name != "real":

@@ -260,14 +260,6 @@ def _drawn_sets(study: str, first_seed: int, count: int, members: int) -> list[C
     return cases
 
 
-def _pairs() -> list[Case]:
-    return _drawn_sets("pairs", 30_000, 120, 2)
-
-
-def _triples() -> list[Case]:
-    return _drawn_sets("triples", 40_000, 60, 3)
-
-
 def _residue() -> list[Case]:
     cases = [Case("residue", 50_000 + index, residue=True, **_noise_of(index)) for index in range(30)]
     names = [name for name in EFFECTS if name not in SIZELESS]
@@ -341,8 +333,8 @@ STUDIES: dict[str, Callable[[], list[Case]]] = {
     "nulls": _nulls,
     "long_nulls": _long_nulls,
     "threshold_nulls": _threshold_nulls,
-    "pairs": _pairs,
-    "triples": _triples,
+    "pairs": lambda: _drawn_sets("pairs", 30_000, 120, 2),
+    "triples": lambda: _drawn_sets("triples", 40_000, 60, 3),
     "residue": _residue,
     "short_runs": lambda: _elsewhere("short_runs", 60_000, {"duration": 20.0}),
     "long_runs": lambda: _elsewhere("long_runs", 61_000, {"duration": 600.0}, 12),

@@ -134,7 +134,7 @@ def draw_unit(array: AccelerometerArray, tolerances: Tolerances, rng: np.random.
     return ToleranceUnit(array.with_geometry(places, axes), errors, tolerances.noise)
 
 
-def reference_motion(array: AccelerometerArray, *, time: float, rate: float, sample_rate: float = 100.0) -> Scenario:
+def reference_motion(array: AccelerometerArray, *, time: float, rate: float) -> Scenario:
     """Return the motion in which arrays are compared: level at rest, then spun up about the vertical and held.
 
     Parameters
@@ -145,11 +145,9 @@ def reference_motion(array: AccelerometerArray, *, time: float, rate: float, sam
         Length, s, longer than rest and ramp.
     rate : float
         Rate that is held, rad/s.
-    sample_rate : float
-        Sample rate, Hz.
     """
     pieces: list[Segment] = [Hold(_REST_S), Ramp(rate, _RAMP_S), Hold(time - _LEAST_TIME_S)]
-    return Scenario("reference motion", array, spin_profile(pieces), time, sample_rate, cube_offset=(0.0, 0.0, 0.0))
+    return Scenario("reference motion", array, spin_profile(pieces), time, 100.0, cube_offset=(0.0, 0.0, 0.0))
 
 
 def tolerated_run(

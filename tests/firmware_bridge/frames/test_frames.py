@@ -19,12 +19,12 @@ from firmware_bridge import (
     Status,
     crc16,
     crc16_rows,
-    encode_message,
     encode_samples,
     frame_format,
     parse_message,
 )
 from gfimu import InputError, read_mimu4444
+from tests.firmware_bridge.made_frames import encode_message
 
 FRAME = LPC1768_DTYPE.itemsize
 

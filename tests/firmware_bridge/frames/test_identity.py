@@ -5,8 +5,9 @@ import struct
 import numpy as np
 import pytest
 
-from firmware_bridge import LPC1768_DTYPE, FrameType, encode_message, parse_message, set_rate
+from firmware_bridge import LPC1768_DTYPE, FrameType, parse_message, set_rate
 from gfimu import InputError
+from tests.firmware_bridge.made_frames import encode_message
 
 GIVEN = {"rate": 100, "code": 10, "format": 11, "baud": 0, "present": 15, "cause": 1, "streaming": 1, "sensors": 4}
 

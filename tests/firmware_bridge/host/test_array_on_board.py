@@ -18,7 +18,6 @@ from firmware_bridge import (
     FrameType,
     SampleDecoder,
     TcpPort,
-    encode_message,
     encode_samples,
     parse_message,
 )
@@ -28,6 +27,7 @@ from gfimu import AccelerometerArray, BoardSettings, InputError, RecordCallbacks
 from gfimu.recording import Recording
 from sim.scenarios import Scenario
 from sim.simulation import simulate
+from tests.firmware_bridge.made_frames import encode_message
 
 IDENTITY = bytes.fromhex("01 010300 6400 0a 0b 00c20100 0f 01 01 04 efbeadde 8813 0000")
 SECONDS = 20.0  # of the paper's run: a rest and two speeds

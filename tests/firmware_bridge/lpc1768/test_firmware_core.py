@@ -23,13 +23,13 @@ from firmware_bridge import (
     SampleDecoder,
     Samples,
     Status,
-    build_host_library,
     crc16,
     encode_command,
     parse_message,
     set_range,
     set_rate,
 )
+from tests.firmware_bridge.host_library import host_library
 
 US = TICKS_PER_SECOND // 1_000_000
 EXCHANGE = ctypes.CFUNCTYPE(None, ctypes.c_uint32, ctypes.POINTER(ctypes.c_uint16), ctypes.c_uint32)
@@ -37,7 +37,7 @@ EXCHANGE = ctypes.CFUNCTYPE(None, ctypes.c_uint32, ctypes.POINTER(ctypes.c_uint1
 
 @pytest.fixture(scope="module")
 def library(tmp_path_factory):
-    return ctypes.CDLL(str(build_host_library(tmp_path_factory.mktemp("host"))))
+    return host_library(tmp_path_factory.mktemp("host"))
 
 
 class Host:
@@ -122,7 +122,7 @@ def test_rate_codes(library) -> None:
 
 @pytest.fixture(scope="module")
 def named_library(tmp_path_factory):
-    return ctypes.CDLL(str(build_host_library(tmp_path_factory.mktemp("named"), array="cube12_as_built")))
+    return host_library(tmp_path_factory.mktemp("named"), array="cube12_as_built")
 
 
 def test_it_states_its_array_before_each_identity(named_library) -> None:

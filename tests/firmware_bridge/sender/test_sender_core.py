@@ -18,12 +18,12 @@ from firmware_bridge import (
     SampleDecoder,
     Samples,
     Status,
-    build_host_library,
     encode_command,
     set_range,
     set_rate,
 )
 from tests.firmware_bridge.conftest import moving_source
+from tests.firmware_bridge.host_library import host_library
 
 US = TICKS_PER_SECOND // 1_000_000
 BAUD = 1_562_500
@@ -124,7 +124,7 @@ class Firmware(Bus):
 
 @pytest.fixture(scope="module")
 def core_library(tmp_path_factory):
-    return ctypes.CDLL(str(build_host_library(tmp_path_factory.mktemp("core"))))
+    return host_library(tmp_path_factory.mktemp("core"))
 
 
 def samples_of(data: bytes) -> Samples:

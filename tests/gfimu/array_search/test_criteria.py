@@ -11,7 +11,7 @@ from gfimu.array_search.criteria import Goal
 from gfimu.array_search.exchange import drawn_rows, log_figure
 from gfimu.array_search.objectives import OBJECTIVES, Conditions, objective
 from gfimu.array_search.polish import _objective, _Variables, alpha_leakage, leakage_and_slope
-from gfimu.array_search.problem import Design, Problem, Tolerance, rows_of, slopes_by_design
+from gfimu.array_search.problem import Design, Problem, ToleranceTable, rows_of, slopes_by_design
 from gfimu.array_search.scoring import score
 from gfimu.array_search.shapes import box, frames_across
 from gfimu.rate import alpha_std
@@ -44,7 +44,7 @@ def test_slopes_by_design_are_derivatives():
 
 @pytest.mark.parametrize("name", OBJECTIVES)
 @pytest.mark.parametrize("k", [1, 2, 3])
-@pytest.mark.parametrize("tolerance", [None, Tolerance(0.001, 0.02, 4)])
+@pytest.mark.parametrize("tolerance", [None, ToleranceTable(0.001, 0.02, 4)])
 def test_the_polish_sees_the_gradient_of_every_objective(name, k, tolerance):
     problem = Problem({1: 14, 2: 8, 3: 5}[k], k, CUBE, tolerance=tolerance)
     goal = Goal(((1.0, objective(name, problem, Conditions()).criterion, tolerance is not None),))
@@ -68,7 +68,7 @@ def test_the_gradient_of_the_leakage_is_its_derivative():
 @pytest.mark.parametrize("name", OBJECTIVES)
 @pytest.mark.parametrize("k", [1, 2, 3])
 def test_an_update_for_an_exchange_is_a_fresh_evaluation(name, k):
-    problem = Problem({1: 15, 2: 8, 3: 6}[k], k, CUBE, tolerance=Tolerance(0.001, 0.02, 3))
+    problem = Problem({1: 15, 2: 8, 3: 6}[k], k, CUBE, tolerance=ToleranceTable(0.001, 0.02, 3))
     criterion = objective(name, problem, Conditions()).criterion
     design = random_design(problem.n_chips, k)
     rows = drawn_rows(problem, design.positions, design.axes, np.arange(problem.n_chips))  # (s, n, k, 12)
@@ -146,7 +146,7 @@ def test_noise_of_the_part_is_that_at_the_sample_rate():
 
 def test_the_worst_draw_counts_and_the_nominal_array_is_one_of_them(random_array):
     problem, design, _ = random_array
-    loose = Problem(6, 3, CUBE, tolerance=Tolerance(0.002, 0.05, 16))
+    loose = Problem(6, 3, CUBE, tolerance=ToleranceTable(0.002, 0.05, 16))
     goal = objective("gdop_worst", loose, Conditions()).goal
     rows = drawn_rows(loose, design.positions, design.axes, np.arange(6)).reshape(17, -1, 12)
     each = np.exp(0.5 * np.log([np.trace(np.linalg.inv(one[:, :6].T @ one[:, :6])) for one in rows]))

@@ -6,7 +6,7 @@ import pytest
 from gfimu import InputError
 from gfimu.array_search.front import find_front
 from gfimu.array_search.objectives import Conditions, objective
-from gfimu.array_search.problem import Problem, Sites, Tolerance
+from gfimu.array_search.problem import Problem, Sites, ToleranceTable
 from gfimu.array_search.search import search
 from gfimu.array_search.shapes import box
 
@@ -51,7 +51,7 @@ def test_a_smaller_volume_costs_in_one_unit_of_length():
 
 
 def test_worst_case_against_nominal():
-    problem = Problem(5, 3, CUBE, tolerance=Tolerance(0.004, 0.0, 4))
+    problem = Problem(5, 3, CUBE, tolerance=ToleranceTable(0.004, 0.0, 4))
     found = front(problem, "gdop", "gdop_worst", starts=1)
     assert all(point.values[0] <= point.values[1] * (1 + 1e-9) for point in found.points)
 

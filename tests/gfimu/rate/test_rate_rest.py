@@ -23,15 +23,14 @@ def still(duration):
 
 def test_blocks_at_rest_are_recognised_at_the_stated_rate():
     motion = still(200.0)
-    test = RestTest()
     missed = 0
     for seed in range(10):
         values = measure(ARRAY, motion, np.random.default_rng(seed), quantise=False)
         noise = total_noise_std(ARRAY, RATE)
-        passed = constant_readings(ARRAY, values, np.sqrt(noise**2 - (0.0039 * GRAVITY) ** 2 / 12), 1 / RATE, test)
+        passed = constant_readings(ARRAY, values, np.sqrt(noise**2 - (0.0039 * GRAVITY) ** 2 / 12), 1 / RATE)
         missed += np.count_nonzero(~passed.reshape(-1, 50)[:, 0])
     # Two of the five statistics, 4000 blocks: 16 expected; within four standard deviations of Poisson.
-    assert abs(missed - 4000 * test.false_alarm * 2 / 5) < 4 * 4
+    assert abs(missed - 4000 * RestTest().false_alarm * 2 / 5) < 4 * 4
 
 
 def test_a_rest_is_not_lost_to_blocks_that_fail_by_chance():

@@ -8,12 +8,12 @@ import gfimu
 from gfimu import InputError
 from gfimu.rate.axis.axis_gyro import with_axis_gyro
 from sim import Hold, Ramp, spin_profile
-from sim.motions.carried import Hand, Wheel
+from sim.motions.carried import HandTable, Wheel
 from sim.scenarios import Scenario
 
 SPIN = spin_profile([Hold(1.0), Ramp(6.0, 2.0), Hold(3.0), Ramp(-3.0, 2.0), Hold(2.0)], start_angle=0.4)
 WHEEL = Wheel(SPIN, radius=0.3, axis=(0.2, -0.5, 0.8), shake=2.0, seed=4)
-HAND = Hand(duration=10.0, seed=3)
+HAND = HandTable(duration_s=10.0, seed=3)
 STEP = 1e-4
 
 
@@ -55,9 +55,9 @@ def test_a_hand_begins_and_ends_at_rest():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Hand(duration=4.0), "too short"),
-        (lambda: Hand(duration=100.0, pace=1e-6), "movements"),
-        (lambda: Hand(duration=100.0, turn=1e308), "at most"),
+        (lambda: HandTable(duration_s=4.0).motion(), "too short"),
+        (lambda: HandTable(duration_s=100.0, pace_s=1e-6).motion(), "movements"),
+        (lambda: HandTable(duration_s=100.0, turn_rad=1e308).motion(), "at most"),
         (lambda: Wheel(SPIN, axis=(1e308, 1e308, 0.0)), "give a direction"),
         (lambda: Wheel(SPIN, radius=-1.0), "must not be negative"),
         (lambda: Wheel(SPIN, axis=(0.0, 0.0, 0.0)), "give a direction"),

@@ -73,8 +73,6 @@ class LiveWatch:
         Sample period, s.
     at_rest : bool
         Whether the stream may begin with a rest.
-    policy : MonitorPolicy, optional
-        Thresholds.
 
     Attributes
     ----------
@@ -87,16 +85,8 @@ class LiveWatch:
         If the array can't see all six motions.
     """
 
-    def __init__(
-        self,
-        array: AccelerometerArray,
-        errors: SensorErrors,
-        period: float,
-        *,
-        at_rest: bool = True,
-        policy: MonitorPolicy | None = None,
-    ) -> None:
-        self.array, self.policy, self._period = array, policy or MonitorPolicy(), period
+    def __init__(self, array: AccelerometerArray, errors: SensorErrors, period: float, *, at_rest: bool = True) -> None:
+        self.array, self.policy, self._period = array, MonitorPolicy(), period
         self._errors = errors
         self._monitor: ChannelMonitor | None = None
         self._agreement: Agreement | None = None

@@ -72,7 +72,7 @@ class Suggestion:
     sure: tuple[str, ...] = ()
 
 
-def suggest(raw: RawFile, *, table: str = "", name: str = "map", text: TextSpec = TextSpec()) -> Suggestion:
+def suggest(raw: RawFile, *, table: str = "", name: str = "map") -> Suggestion:
     """Return a map to start from.
 
     Parameters
@@ -83,8 +83,6 @@ def suggest(raw: RawFile, *, table: str = "", name: str = "map", text: TextSpec 
         Table to begin with; by default the one with the most triads of accelerations.
     name : str
         Name of the map.
-    text : TextSpec
-        Layout of a text file, where it is known.
     """
     reasons: list[str] = []
     chosen = raw.table(table) if table else _most_promising(raw)
@@ -149,7 +147,7 @@ def suggest(raw: RawFile, *, table: str = "", name: str = "map", text: TextSpec 
             channels,
             time=time.spec,
             reference=reference,
-            text=_layout(chosen, text),
+            text=TextSpec() if chosen.named else TextSpec(columns=tuple(chosen.columns)),
             table=chosen.name if len(raw.tables) > 1 else "",
             format="" if raw.format in _UNNAMED else raw.format,
             split_by=split_by or "",
@@ -269,7 +267,3 @@ def _sample_rate(table: RawTable, time: TimeGuess) -> float | None:
     except InputError:
         return None
     return 1.0 / float(np.median(np.diff(t))) if len(t) > 1 else None
-
-
-def _layout(table: RawTable, text: TextSpec) -> TextSpec:
-    return text if table.named or text.columns else TextSpec(columns=tuple(table.columns))

@@ -17,6 +17,7 @@ __all__ = ["NEAR", "TriadUnit", "rest_windows", "sphere_of", "triad_values", "un
 
 _GRAVITY = {"m/s^2": 1.0, "g": STANDARD_GRAVITY, "mg": STANDARD_GRAVITY / 1e3, "mm/s^2": 1e-3, "cm/s^2": 1e-2}
 NEAR = 0.08  # relative, of gravity at rest: gains of parts lie within
+_WINDOWS = 400  # pieces into which a triad is divided to look for rest
 _BEST, _AS_QUIET = 5, 3.0  # pieces that show how quiet rest is, and how many times that still counts as rest
 _STEP_SCATTER = 1.0  # steps by which rounded readings scatter at rest
 _LOW_COUNTS = 20.0  # below that counts per g would be too coarse for any part
@@ -69,10 +70,10 @@ def triad_values(table: RawTable, columns: Sequence[str]) -> NDArray[np.float64]
     return np.column_stack([table.numbers(name) for name in columns])
 
 
-def rest_windows(values: NDArray[np.float64], windows: int = 400) -> NDArray[np.float64]:
+def rest_windows(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the means of the quietest of equal pieces of a triad, (k, 3): a fifth at most."""
     rows = values[np.isfinite(values).all(axis=1) & values.any(axis=1)]  # zeros throughout: nothing measured yet
-    size = max(len(rows) // windows, 8)
+    size = max(len(rows) // _WINDOWS, 8)
     count = len(rows) // size
     if count < 5:
         return rows.mean(axis=0, keepdims=True) if len(rows) else np.empty((0, 3))

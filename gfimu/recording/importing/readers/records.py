@@ -192,6 +192,7 @@ def read_excel(path: Path, text: TextSpec = TextSpec()) -> RawFile:
     with parsing(path, "workbook", "save the sheet as CSV"):
         with zipfile.ZipFile(path) as archive:
             limit.needs(_TIMES_SHEET * sum(one.file_size for one in archive.infolist()))
+        tabs = msgspec.structs.replace(text, separator="tab", decimal=".")
         book = openpyxl.load_workbook(path, read_only=True, data_only=True, keep_links=False)
         for sheet in book.worksheets:
             sheet.reset_dimensions()  # a file may state a million columns; rows are as long as they are
@@ -201,7 +202,7 @@ def read_excel(path: Path, text: TextSpec = TextSpec()) -> RawFile:
                 size += len(lines[-1]) + _ROW
                 limit.needs(GROWS * size, at_least=True)
             try:
-                table = table_of_text("\n".join(lines).encode(), f"{path}/{sheet.title}", _tabs(text), limit)
+                table = table_of_text("\n".join(lines).encode(), f"{path}/{sheet.title}", tabs, limit)
             except MemoryLimitError:
                 raise
             except InputError:
@@ -210,10 +211,6 @@ def read_excel(path: Path, text: TextSpec = TextSpec()) -> RawFile:
     if not tables:
         raise InputError(f"{path}: no sheet with numbers in columns; save the recording as CSV")
     return RawFile(str(path), "excel", tables)
-
-
-def _tabs(text: TextSpec) -> TextSpec:
-    return msgspec.structs.replace(text, separator="tab", decimal=".")
 
 
 def _cell(value: Any) -> str:
