@@ -29,7 +29,7 @@ __all__ = ["located", "with_place"]
 
 _Floats = NDArray[np.float64]
 _ROWS = 25  # numerical: of a table
-_SEARCHED = 2  # numerical: stretches in which terms are searched
+_SEARCHED, _MOST_ROWS = 2, 20_000  # numerical: stretches in which terms are searched, and samples of each
 _NO_MISTAKE = (
     "Other orders and signs of the channels, millimetres, centimetres or inches for metres, and other arrays of the "
     "library were tried: none of them fits."
@@ -69,8 +69,8 @@ def with_place(found: Diagnosis, stretches: Sequence[Stretch], runs: Sequence[Ru
 
 
 def _described(stretches: Sequence[Stretch], policy: Policy) -> tuple[Located, ...]:
-    """Return where something without a name is, searched in the first stretches of the recordings."""
-    some = stretches[:_SEARCHED]
+    """Return where something without a name is, searched in the first samples of the first stretches."""
+    some = [replace(one, run=one.run.rows(0, min(len(one.run.t), _MOST_ROWS))) for one in stretches[:_SEARCHED]]
     if some[0].model.placed(some[0].run.mounting) is None:
         return ()
     try:

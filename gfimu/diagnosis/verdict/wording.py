@@ -176,7 +176,7 @@ def _headline(verdict: str, causes: Sequence[NamedCause], unexplained: Unexplain
 def _surrogate_sentence(terms: int, left_out: int) -> str:
     if not terms and not left_out:
         return (
-            "No function of the motion, the angle or time predicts it on validation data, so the extended twin "
+            "No function that is added to channels or reference predicts it on validation data, so the extended twin "
             "is without it."
         )
     clock = ""
