@@ -8,6 +8,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 
 from gfimu import AccelerometerArray
@@ -36,6 +37,8 @@ def plain(value: Any) -> Any:
         return {"": type(value).__name__} | {
             field.name: plain(getattr(value, field.name)) for field in dataclasses.fields(value)
         }
+    if isinstance(value, msgspec.Struct):
+        return {"": type(value).__name__} | {name: plain(getattr(value, name)) for name in value.__struct_fields__}
     if isinstance(value, Effect):
         return {"": type(value).__name__, "parameters": plain(value.parameters)}
     if isinstance(value, SplineSpin):

@@ -31,12 +31,6 @@ class Policy:
     extra_odds : float
         Log odds that a further cause, or a term of a surrogate, needs against the set without it [nats]. Set as
         ``cause_odds``, beside causes that leave a little by their own inexactness.
-    unnamed : float
-        Log prior of a function at a place, as one of the many that have no name [nats]. Set in a prototype, where it
-        separated right names from descriptions of the same worlds.
-    free_odds : float
-        Log odds that an error free in time needs, at the place where it removes most [nats]. Set on runs with nothing
-        hidden, which reached 23.
     extra_cause : float
         Log prior odds of each cause beyond the first [nats]. By choice: ln 0.3.
     close : float
@@ -130,9 +124,6 @@ class Policy:
     temperature : float
         Divisor of log posteriors [1]: the linear Gaussian model is never quite true. Set where it makes what was
         hidden in the runs ``faint`` of `sim.trials.study` the most likely.
-    most_certain_place : float
-        Largest probability of a place that is reported, and of all that the data prefer by far [1]. Set by worlds
-        outside the library of the generator that the benchmark draws ``unlisted`` from, other than its test split.
     most_certain : float
         Largest probability that is reported [1]. Set by `sim.trials.study`: of causes surer than this, 3 of 1000 were
         wrong.
@@ -146,8 +137,6 @@ class Policy:
     most_causes: int = 4
     cause_odds: float = 4.0
     extra_odds: float = 7.0
-    unnamed: float = -13.0
-    free_odds: float = 25.0
     extra_cause: float = -1.2
     close: float = 22.0
     rounds: int = 6
@@ -182,7 +171,6 @@ class Policy:
     block_duration: float = 8.0
     block_angle_std: float = 5e-3
     temperature: float = 1.2
-    most_certain_place: float = 0.9
     most_certain: float = 0.997
     free_body: bool = False
 

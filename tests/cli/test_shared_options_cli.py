@@ -10,7 +10,7 @@ import typer
 from every_item import every
 
 import gfimu
-from gfimu.commands import known_axis, place, program
+from gfimu.commands import estimate, known_axis, program
 from gfimu.commands.shell import options as shared
 from gfimu.commands.shell.declare import Group, Option, marked
 
@@ -69,7 +69,7 @@ for option, where, one in options():
 
 def declared():
     """Yield the options that are declared for several commands, by their names on the shell."""
-    for module in (shared, known_axis, place):
+    for module in (shared, known_axis, estimate):
         for name, value in vars(module).items():
             if isinstance(value, Option):
                 yield value.flag(name.lower()), value

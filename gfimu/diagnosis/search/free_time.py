@@ -20,12 +20,12 @@ from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.terms.cause import effects_of
 from gfimu.diagnosis.terms.located.alternatives import channel_patterns, chip_groups
 from gfimu.diagnosis.terms.located.operators import Place, channel_place, rig_places
+from gfimu.diagnosis.terms.located.policy import LOCATED
 from gfimu.model.world_model import reads_place
 
 __all__ = ["FreeTime", "free_time"]
 
 _Floats = NDArray[np.float64]
-_BLOCK_S, _BANDS = 0.5, 40  # numerical: blocks of time, and of frequency
 
 
 @dataclass(frozen=True)
@@ -96,10 +96,10 @@ def _gained(residual: _Floats, direction: _Floats, period: float) -> float:
     size = np.linalg.norm(direction, axis=1)
     if not size.max() > 0.0:
         return 0.0
-    signal = np.sum(residual * direction, axis=1) / np.maximum(size, 1e-9 * size.max())
-    in_time = np.array_split(signal, max(int(len(signal) * period / _BLOCK_S), 1))
+    signal = np.sum(residual * direction, axis=1) / np.maximum(size, 1e-9 * size.max())  # numerical
+    in_time = np.array_split(signal, max(int(len(signal) * period / LOCATED.block_s), 1))
     spectrum = np.fft.rfft(signal - signal.mean())[1:] / np.sqrt(len(signal))
-    in_frequency = np.array_split(np.abs(spectrum), min(_BANDS, len(spectrum)))
+    in_frequency = np.array_split(np.abs(spectrum), min(LOCATED.bands, len(spectrum)))
     return max(_evidence(in_time, 0.5), _evidence(in_frequency, 1.0))
 
 

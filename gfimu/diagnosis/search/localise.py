@@ -19,13 +19,9 @@ from gfimu.diagnosis.fit.linear import Point
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.free_time import FreeTime, free_time
 from gfimu.diagnosis.search.located_screen import Leader, LocatedScreen
+from gfimu.diagnosis.terms.located.policy import LOCATED
 
 __all__ = ["Localised", "Rival", "localise"]
-
-_LEARNT = 2  # numerical: leaders that are compared under their own noise
-_REFITTED = 4  # numerical: leaders that are fitted
-_BEHIND = 40.0  # numerical: nats behind the leader, and half its odds, from which a term is not fitted
-_MOST = 3  # numerical: terms
 
 
 @dataclass(frozen=True)
@@ -66,7 +62,7 @@ def localise(stretches: Sequence[Stretch], policy: Policy) -> Localised:
     stretches : sequence of Stretch
         The data of a table.
     policy : Policy
-        Thresholds ``unnamed``, ``cause_odds`` and ``extra_odds``.
+        Thresholds ``cause_odds``, ``extra_odds`` and ``dominant``.
 
     Raises
     ------
@@ -78,7 +74,7 @@ def localise(stretches: Sequence[Stretch], policy: Policy) -> Localised:
     present = fit(stretches, point, few)
     least = _settled(stretches, present, policy).log_posterior
     rounds: list[tuple[Rival, ...]] = []
-    while len(rounds) < _MOST:
+    while len(rounds) < LOCATED.terms:
         needed = max(policy.extra_odds, policy.dominant * rounds[0][0].log_odds) if rounds else policy.cause_odds
         compared = _compared(stretches, present, policy)
         if not compared or compared[0][1].log_posterior - least < needed:
@@ -92,12 +88,12 @@ def localise(stretches: Sequence[Stretch], policy: Policy) -> Localised:
 def _compared(stretches: Sequence[Stretch], present: Fit, policy: Policy) -> list[tuple[Leader, Fit]]:
     """Return the leading terms beside those of a fit, each under the noise that it leaves, best first."""
     fitted = []
-    for leader in _distinct(LocatedScreen(stretches, present.point, policy).leaders()):
+    for leader in _distinct(LocatedScreen(stretches, present.point).leaders()):
         point = replace(present.point, causes=(*present.causes, leader.cause))
         fitted += _tried(leader, stretches, point, policy)
     fitted.sort(key=lambda pair: -pair[1].log_posterior)
     learnt = []
-    for leader, found in fitted[:_LEARNT]:
+    for leader, found in fitted[: LOCATED.compared]:
         try:
             learnt.append((leader, _settled(stretches, found, policy)))
         except np.linalg.LinAlgError:  # what would be learnt leaves nothing that can be solved
@@ -125,7 +121,7 @@ def _distinct(leaders: Sequence[Leader]) -> list[Leader]:
     for leader in leaders:
         where, dependence = leader.term.where, leader.term.dependence
         best = leaders[0].log_odds
-        if leader.log_odds < min(best - _BEHIND, 0.5 * best) or len(found) == _REFITTED:
+        if leader.log_odds < min(best - LOCATED.behind, 0.5 * best) or len(found) == LOCATED.fitted:
             break
         found.setdefault((where.name, where.what, leader.term.pattern, dependence.kind), leader)
     return list(found.values())

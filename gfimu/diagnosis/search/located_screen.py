@@ -11,22 +11,19 @@ from numpy.typing import NDArray
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.evidence import SCALES, inverse, log_evidence
 from gfimu.diagnosis.fit.linear import Point, linearise
-from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.waves import wave_terms
 from gfimu.diagnosis.terms.cause import Cause, effects_of
 from gfimu.diagnosis.terms.columns import Columns
 from gfimu.diagnosis.terms.library import cause_columns
 from gfimu.diagnosis.terms.located.alternatives import ChannelTerms, channel_terms, dependences, rig_terms
 from gfimu.diagnosis.terms.located.operators import channel_place
+from gfimu.diagnosis.terms.located.policy import LOCATED
 from gfimu.diagnosis.terms.located.term import LocatedTerm, located_columns
 from gfimu.model.world_model import reads_place
 
 __all__ = ["Leader", "LocatedScreen"]
 
 _Floats = NDArray[np.float64]
-_WIDEST = 320  # numerical: coefficients of a term beyond which it describes anything
-_SHAPED, _WIDTHS = 6, (1.0, 0.3, 0.1, 0.03)  # numerical: leaders whose shape is refined, and by how wide steps
-_LEAST_GRAM = 1e-9  # numerical: information below which a term is not seen at all
 
 
 @dataclass(frozen=True)
@@ -51,8 +48,8 @@ class Leader:
 class LocatedScreen:
     """Normal equations of located terms at a point, drives, slow noise and the causes there integrated out."""
 
-    def __init__(self, stretches: Sequence[Stretch], point: Point, policy: Policy) -> None:
-        self._stretches, self._policy, self._array = stretches, policy, stretches[0].model.array
+    def __init__(self, stretches: Sequence[Stretch], point: Point) -> None:
+        self._stretches, self._array = stretches, stretches[0].model.array
         self._posteriors = linearise(stretches, point, responses=False).posteriors
         self._states = [
             stretch.state(effects_of(point.causes, self._array, stretch.index), drive.spin)
@@ -69,17 +66,17 @@ class LocatedScreen:
         every = dependences(self._states)
         waves, of_channels = wave_terms(self._states, self._posteriors, self._array, is_angle=is_angle)
         terms = [*rig_terms(self._states, every, is_angle=is_angle), *waves]
-        found = [self._judged(term, *self._products(term)) for term in terms if term.count <= _WIDEST]
+        found = [self._judged(term, *self._products(term)) for term in terms if term.count <= LOCATED.widest]
         for some in (*channel_terms(self._states, every, self._array), *of_channels):
             found += self._of_channels(some)
         seen = [leader for leader in found if leader is not None and np.isfinite(leader.log_odds)]
         seen.sort(key=lambda leader: -leader.log_odds)
-        shaped = [leader for leader in seen[:_SHAPED] if leader.term.dependence.near(1.0)]
+        shaped = [leader for leader in seen[: LOCATED.refined] if leader.term.dependence.near(1.0)]
         return sorted([*map(self._refined, shaped), *seen], key=lambda leader: -leader.log_odds)
 
     def _refined(self, leader: Leader) -> Leader:
         """Return a leader at the most probable frequency, damping or order nearby."""
-        for width in _WIDTHS:
+        for width in LOCATED.widths:
             for dependence in leader.term.dependence.near(width):
                 term = replace(leader.term, dependence=dependence)
                 other = self._judged(term, *self._products(term))
@@ -107,7 +104,7 @@ class LocatedScreen:
         gram, score = self._products(every)
         count = some.dependence.count
         for term, groups in some.terms():
-            if term.count > _WIDEST:
+            if term.count > LOCATED.widest:
                 continue
             mixing = np.zeros((len(single), len(groups)))
             for component, group in enumerate(groups):
@@ -117,7 +114,7 @@ class LocatedScreen:
 
     def _judged(self, term: LocatedTerm, gram: _Floats, score: _Floats) -> Leader | None:
         """Return a term at its most probable length scale; None where it is not seen."""
-        if not np.trace(gram) > _LEAST_GRAM:
+        if not np.trace(gram) > LOCATED.least_information:
             return None
         prior = self._log_prior(term)
         best: tuple[float, int, _Floats] | None = None
@@ -133,4 +130,4 @@ class LocatedScreen:
 
     def _log_prior(self, term: LocatedTerm) -> float:
         alike = {"one": self._array.n_channels, "chip": len(self._array.chips)}.get(term.pattern, 1)
-        return self._policy.unnamed - term.dependence.looks - float(np.log(alike))
+        return LOCATED.log_prior - term.dependence.looks - float(np.log(alike))

@@ -19,10 +19,6 @@ from gfimu.diagnosis.terms.located.term import LocatedTerm
 __all__ = ["signal_of", "wave_terms"]
 
 _Floats = NDArray[np.float64]
-_AT_EACH_PLACE = 2  # numerical: strongest waves of each kind
-_LEAST_TURNED = 4.0 * np.pi  # numerical: rad, in which an order can be told from a function of the angle
-_PADDED = 4  # numerical: length of a transform over that of its signal
-_APART = 24  # numerical: points of that transform between two waves
 
 
 def signal_of(operator: Operator, whitened: _Floats, weights: _Floats) -> _Floats:
@@ -38,7 +34,7 @@ def signal_of(operator: Operator, whitened: _Floats, weights: _Floats) -> _Float
         One over the white variance of each observation.
     """
     part = next(part for part in reversed(operator.parts) if part is not None)
-    return np.asarray(np.sum(part * whitened, axis=1) / np.maximum(part**2 @ weights, 1e-12))
+    return np.asarray(np.sum(part * whitened, axis=1) / np.maximum(part**2 @ weights, 1e-12))  # numerical
 
 
 def wave_terms(
@@ -64,7 +60,7 @@ def wave_terms(
 
 def _waves(signal: _Floats, state: RigState, fastest: float, *, of_time: bool) -> Iterator[Wave]:
     """Yield the strongest waves in signals (n, k) of a place."""
-    scaled = signal / np.maximum(signal.std(axis=0), 1e-12)
+    scaled = signal / np.maximum(signal.std(axis=0), 1e-12)  # numerical
     for hz in _tones(scaled, state.period) if of_time else ():
         yield Wave(hz, 1.0 / (len(state.t) * state.period), of_time=True)
     for cycles in _orders(scaled, state):
@@ -75,7 +71,7 @@ def _waves(signal: _Floats, state: RigState, fastest: float, *, of_time: bool) -
 
 def _tones(scaled: _Floats, period: float) -> list[float]:
     """Return the frequencies of the strongest tones in signals (n, k), Hz."""
-    padded = _PADDED * len(scaled)
+    padded = LOCATED.padded * len(scaled)
     power = np.abs(np.fft.rfft(scaled * np.hanning(len(scaled))[:, None], padded, axis=0)) ** 2
     frequency = np.fft.rfftfreq(padded, period)
     return _peaks(frequency, np.where(frequency > LOCATED.lowest_hz, power.sum(axis=1), 0.0))
@@ -84,26 +80,28 @@ def _tones(scaled: _Floats, period: float) -> list[float]:
 def _orders(scaled: _Floats, state: RigState) -> list[float]:
     """Return the strongest orders in signals (n, k), by their transform over the angle."""
     angle, rate = state.spin.angle, np.abs(state.spin.rate)
-    turned = float(np.ptp(angle)) * (1.0 + 1e-4)
-    if turned < _LEAST_TURNED:
+    turned = float(np.ptp(angle)) * (1.0 + 1e-4)  # numerical
+    if turned < LOCATED.least_turned:
         return []
-    bins = int(2 ** np.ceil(np.log2(max(turned / (2.0 * np.pi) * LOCATED.highest_order * _PADDED, 1024.0))))
-    folded = np.zeros((_PADDED * bins, scaled.shape[1]))
+    bins = int(
+        2 ** np.ceil(np.log2(max(turned / (2.0 * np.pi) * LOCATED.highest_order * LOCATED.padded, 1024.0)))
+    )  # numerical
+    folded = np.zeros((LOCATED.padded * bins, scaled.shape[1]))
     np.add.at(folded, ((angle - angle.min()) / turned * bins).astype(int), scaled * rate[:, None])
     power = np.sum(np.abs(np.fft.rfft(folded, axis=0)) ** 2, axis=1)
-    order = np.arange(len(power)) * 2.0 * np.pi / (_PADDED * turned)
+    order = np.arange(len(power)) * 2.0 * np.pi / (LOCATED.padded * turned)
     return _peaks(order, np.where((order > LOCATED.lowest_order) & (order < LOCATED.highest_order), power, 0.0))
 
 
 def _peaks(axis: NDArray[Any], power: NDArray[Any]) -> list[float]:
     """Return where the highest peaks of a spectrum (k,) are, between its points by a parabola through the logs."""
     rest, found = power.copy(), list[float]()
-    for _ in range(_AT_EACH_PLACE):
+    for _ in range(LOCATED.waves):
         if not rest.max() > 0.0:
             break
         at = int(np.clip(np.argmax(rest), 1, len(rest) - 2))
-        low, top, high = np.log(np.maximum(rest[at - 1 : at + 2], 1e-300))
-        shift = float(np.clip(0.5 * (low - high) / min(low - 2.0 * top + high, -1e-12), -0.5, 0.5))
+        low, top, high = np.log(np.maximum(rest[at - 1 : at + 2], 1e-300))  # numerical
+        shift = float(np.clip(0.5 * (low - high) / min(low - 2.0 * top + high, -1e-12), -0.5, 0.5))  # numerical
         found.append(float(axis[at]) + shift * float(axis[1] - axis[0]))
-        rest[max(at - _APART, 0) : at + _APART + 1] = 0.0
+        rest[max(at - LOCATED.apart, 0) : at + LOCATED.apart + 1] = 0.0
     return found

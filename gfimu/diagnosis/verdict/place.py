@@ -18,6 +18,7 @@ from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.free_time import FreeTime
 from gfimu.diagnosis.search.localise import Localised, Rival, localise
 from gfimu.diagnosis.terms.cause import Cause
+from gfimu.diagnosis.terms.located.policy import LOCATED
 from gfimu.diagnosis.terms.located.term import LocatedTerm
 from gfimu.diagnosis.verdict.gate import NOT_THIS_UNIT
 from gfimu.diagnosis.verdict.likely_mistakes import likely_mistake
@@ -28,8 +29,6 @@ from gfimu.model.world_model import is_linear
 __all__ = ["located", "with_place"]
 
 _Floats = NDArray[np.float64]
-_ROWS = 25  # numerical: of a table
-_SEARCHED, _MOST_ROWS = 2, 20_000  # numerical: stretches in which terms are searched, and samples of each
 _NO_MISTAKE = (
     "Other orders and signs of the channels, millimetres, centimetres or inches for metres, and other arrays of the "
     "library were tried: none of them fits."
@@ -70,7 +69,10 @@ def with_place(found: Diagnosis, stretches: Sequence[Stretch], runs: Sequence[Ru
 
 def _described(stretches: Sequence[Stretch], policy: Policy) -> tuple[Located, ...]:
     """Return where something without a name is, searched in the first samples of the first stretches."""
-    some = [replace(one, run=one.run.rows(0, min(len(one.run.t), _MOST_ROWS))) for one in stretches[:_SEARCHED]]
+    some = [
+        replace(one, run=one.run.rows(0, min(len(one.run.t), LOCATED.samples)))
+        for one in stretches[: LOCATED.stretches]
+    ]
     if some[0].model.placed(some[0].run.mounting) is None:
         return ()
     try:
@@ -87,10 +89,10 @@ def located(found: Localised, policy: Policy) -> tuple[Located, ...]:
     found : Localised
         The terms at their optimum.
     policy : Policy
-        Thresholds ``free_odds``, ``cause_odds``, ``least_share``, ``temperature`` and ``most_certain_place``.
+        Thresholds ``cause_odds``, ``least_share`` and ``temperature``.
     """
     explained = sum(rivals[0].log_odds for rivals in found.rounds)
-    if found.free and found.free[0].log_odds > max(policy.free_odds, policy.least_share * explained):
+    if found.free and found.free[0].log_odds > max(LOCATED.free_odds, policy.least_share * explained):
         return (_of_time(found.free, policy),)
     stretch = found.stretches[0]
     state = stretch.state((), found.fit.point.drives[0].spin)
@@ -113,7 +115,7 @@ def _of_term(cause: Cause, rivals: Sequence[Rival], state: RigState, policy: Pol
         series=term.where.components if any(term.where.components) else (),
         dependence=term.dependence.name,
         text=f"{_words(term)}{size}",
-        place_probability=min(float(same), 1.0) * policy.most_certain_place,
+        place_probability=min(float(same), 1.0) * LOCATED.most_certain_place,
         log_odds=best.log_odds,
         instead=tuple(map(_words, close)),
         function=table,
@@ -133,7 +135,7 @@ def _of_time(places: Sequence[FreeTime], policy: Policy) -> Located:
         series=best.where.components if any(best.where.components) else (),
         dependence="time",
         text=f"{best.where.words}, in time, with nothing else that is known",
-        place_probability=min(float(same), 1.0) * policy.most_certain_place,
+        place_probability=min(float(same), 1.0) * LOCATED.most_certain_place,
         log_odds=best.log_odds,
         instead=tuple(one.where.words for one in close),
     )
@@ -158,7 +160,7 @@ def _function(cause: Cause, term: LocatedTerm, state: RigState) -> tuple[Functio
     if of is None:
         return None, f" (up to {size})"
     x = of.of(state)
-    rows = np.unique(np.argsort(x)[np.linspace(0, len(x) - 1, _ROWS).round().astype(int)])
+    rows = np.unique(np.argsort(x)[np.linspace(0, len(x) - 1, LOCATED.rows).round().astype(int)])
     rows = rows[np.argsort(x[rows])]
     mixing = cause.mixing[largest * count : (largest + 1) * count] * term.where.usual
     spread = basis[rows] @ mixing  # (rows, k)
@@ -175,7 +177,7 @@ def _amount(value: float, unit: str) -> str:
     """Return a value with its unit as people read it."""
     if unit == "1":
         return f"{100.0 * value:+.2g} %"
-    for factor, name in ((1e3, "m"), (1e6, "µ")):
-        if abs(value) * factor >= 1.0 and abs(value) < 0.1 and unit in ("rad", "m", "s"):
+    for factor, name in ((1e3, "m"), (1e6, "µ")):  # numerical
+        if abs(value) * factor >= 1.0 and abs(value) < 0.1 and unit in ("rad", "m", "s"):  # numerical
             return f"{factor * value:+.3g} {name}{unit}"
     return f"{value:+.3g} {unit}"

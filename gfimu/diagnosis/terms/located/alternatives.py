@@ -32,21 +32,34 @@ __all__ = ["ChannelTerms", "channel_patterns", "channel_terms", "chip_groups", "
 _Floats = NDArray[np.float64]
 ChannelPattern = tuple[str, str, tuple[tuple[int, ...], ...], tuple[str, ...]]
 """Place of the contract, pattern, groups of channels that share an error, and names of the groups."""
-_FASTEST = 0.4  # numerical: share of the sample rate up to which a mode is sampled
 
 RATE = Regressor("omega", "the rate", "rad/s", lambda state: state.spin.rate)
 ACCELERATION = Regressor("alpha", "the angular acceleration", "rad/s²", lambda state: state.spin.acceleration)
 ANGLE = Regressor("theta", "the angle turned", "rad", lambda state: state.spin.angle)
 TIME = Regressor("t", "time", "s", lambda state: state.t)
 _NOTHING = Regressor("1", "nothing", "", lambda state: np.ones_like(state.t))
-_SQUARE = Regressor("omega^2", "the rate squared", "rad²/s²", lambda state: state.spin.rate**2)  # numerical: a square
-# Numerical: squares.
-_FORCES = tuple(
-    Regressor(f"the rotating force {axis}", "the force that turns with the table", "rad²/s²", force)
-    for axis, force in (
-        ("x", lambda s: s.spin.rate**2 * np.cos(s.spin.angle) + s.spin.acceleration * np.sin(s.spin.angle)),
-        ("y", lambda s: s.spin.rate**2 * np.sin(s.spin.angle) - s.spin.acceleration * np.cos(s.spin.angle)),
-    )
+
+
+def _rate_squared(state: RigState) -> _Floats:
+    return np.asarray(state.spin.rate**2)
+
+
+def _force_along_x(state: RigState) -> _Floats:
+    """Return the force of an unbalance along x of the room, over its mass and arm, (n,), rad²/s²."""
+    angle = state.spin.angle
+    return np.asarray(_rate_squared(state) * np.cos(angle) + state.spin.acceleration * np.sin(angle))
+
+
+def _force_along_y(state: RigState) -> _Floats:
+    """Return the same along y."""
+    angle = state.spin.angle
+    return np.asarray(_rate_squared(state) * np.sin(angle) - state.spin.acceleration * np.cos(angle))
+
+
+_SQUARE = Regressor("omega^2", "the rate squared", "rad²/s²", _rate_squared)
+_FORCES = (
+    Regressor("unbalance x", "an unbalance", "rad²/s²", _force_along_x),
+    Regressor("unbalance y", "an unbalance", "rad²/s²", _force_along_y),
 )
 
 
@@ -69,16 +82,16 @@ _WARMING = Regressor("dT/dt", "the rate of change of the temperature", "K/s", _w
 
 
 def _largest(states: Sequence[RigState], regressor: Regressor) -> float:
-    return max(1e-9, *(float(np.abs(regressor.of(state)).max()) for state in states))
+    return max(1e-9, *(float(np.abs(regressor.of(state)).max()) for state in states))  # numerical
 
 
 def dependences(states: Sequence[RigState]) -> dict[str, Dependence]:
     """Return all dependences but modes and waves, by name, on the scales of what rigs did."""
     seen = {one.name: np.concatenate([one.of(state) for state in states]) for one in (RATE, ACCELERATION, ANGLE, TIME)}
     rate, acceleration = _largest(states, RATE), _largest(states, ACCELERATION)
-    usual = max(float(np.sqrt(np.mean(seen["alpha"] ** 2))) / 2.0, 0.05)
-    slow = max(rate / 6.0, 0.05)
-    first, turned = float(seen["theta"][0]), max(float(np.ptp(seen["theta"])), 1e-9)
+    usual = max(float(np.sqrt(np.mean(seen["alpha"] ** 2))) / 2.0, 0.05)  # numerical
+    slow = max(rate / 6.0, 0.05)  # numerical
+    first, turned = float(seen["theta"][0]), max(float(np.ptp(seen["theta"])), 1e-9)  # numerical
     forms = [
         Form("1", "1", "always", _NOTHING, np.asarray, 1.0),
         *(
@@ -132,7 +145,7 @@ def _of_temperature(states: Sequence[RigState]) -> list[Dependence]:
     first, spread = float(seen[0]), float(np.ptp(seen))
     if not spread > LOCATED.warmed:
         return []
-    steep = max(float(np.std(np.concatenate([_warming(state) for state in states]))), 1e-9)
+    steep = max(float(np.std(np.concatenate([_warming(state) for state in states]))), 1e-9)  # numerical
     return [
         Form("T", "T", "in proportion to the temperature", TEMPERATURE, lambda x: x - first, spread),
         curve_over(TEMPERATURE, seen, LOCATED.temperature_functions, LOCATED.temperature_lengths),
@@ -160,16 +173,15 @@ _OF_PLACE = {
     "tilts": ("1", *_OF_RIG),
     "gain": ("1", *_OF_RIG, "f(omega, alpha)", "t"),
 }
-# Numerical: places of outputs.
-_MODES_OF_PLACE = {"reads": (0, 1, 2), "leans": (0,), "moves": (0,), "shakes": (2,), "tilts": (0,)}
-"""What of a mode an error there may follow: displacement, velocity, acceleration."""
 
 
 def rig_terms(states: Sequence[RigState], every: dict[str, Dependence], *, is_angle: bool) -> list[LocatedTerm]:
     """Return the terms of places in the rig, but those of waves that are looked for."""
     places = rig_places(is_angle=is_angle)
     terms = [LocatedTerm(places[what], every[n]) for what, names in _OF_PLACE.items() for n in names if n in every]
-    for what, outputs in _MODES_OF_PLACE.items():
+    displacement, acceleration = (0,), (2,)
+    followed = dict.fromkeys(("leans", "moves", "tilts"), displacement)
+    for what, outputs in (followed | {"reads": (0, 1, 2), "shakes": acceleration}).items():
         regressors = _FORCES if places[what].name == "bench" else (ACCELERATION, _SQUARE)
         terms += [LocatedTerm(places[what], mode) for mode in _modes(states, regressors, outputs)]
     return terms
@@ -177,7 +189,7 @@ def rig_terms(states: Sequence[RigState], every: dict[str, Dependence], *, is_an
 
 def _modes(states: Sequence[RigState], regressors: Sequence[Regressor], outputs: tuple[int, ...]) -> list[Mode]:
     grid = np.geomspace(*LOCATED.mode_hz, LOCATED.modes)
-    slow = grid[grid * states[0].period < _FASTEST]
+    slow = grid[grid * states[0].period < LOCATED.fastest]
     return [Mode(one, _largest(states, one), float(hz), outputs) for one in regressors for hz in slow]
 
 

@@ -37,10 +37,6 @@ __all__ = [
 ]
 
 _Floats = NDArray[np.float64]
-_ROUGH = 0.01  # numerical: share of a filter that is independent from lag to lag
-_FORGOTTEN = 3.0  # numerical: time constants after which a mode has forgotten
-_FASTER = 0.15  # numerical: logarithm of the frequency between two points of the grid of modes
-_LEAST_PRIOR = 1e-6  # numerical: share of the variance below which the prior hardly allows a combination
 
 
 @dataclass(frozen=True)
@@ -108,7 +104,7 @@ class Dependence(ABC):
 def _covariance_root(centres: _Floats, length: float) -> _Floats:
     """Return a root (K, k) of the squared-exponential covariance at centres (K,)."""
     power, turn = np.linalg.eigh(np.exp(-0.5 * ((centres[:, None] - centres) / length) ** 2))
-    kept = power > _LEAST_PRIOR * power[-1]
+    kept = power > LOCATED.least_prior * power[-1]
     return np.asarray(turn[:, kept] * np.sqrt(power[kept]))
 
 
@@ -159,7 +155,7 @@ class Curve(Dependence):
     @cached_property
     def grid(self) -> _Floats:
         """Knots, on the scale 0 to 1."""
-        inner = np.linspace(-1e-9, 1.0 + 1e-9, self.functions - 2)
+        inner = np.linspace(-1e-9, 1.0 + 1e-9, self.functions - 2)  # numerical
         return np.concatenate([[inner[0]] * 3, inner, [inner[-1]] * 3])
 
     @cached_property
@@ -180,7 +176,7 @@ class Curve(Dependence):
     def at(self, x: _Floats) -> _Floats:
         """Return the splines at values (n,) of the regressor, shape (n, K)."""
         low, high, here = (np.arcsinh(v / self.warp) if self.warp else v for v in (self.low, self.high, x))
-        share = np.clip((here - low) / max(high - low, 1e-12), 0.0, 1.0)
+        share = np.clip((here - low) / max(high - low, 1e-12), 0.0, 1.0)  # numerical
         return np.asarray(BSpline.design_matrix(share, self.grid, 3).toarray())
 
 
@@ -304,7 +300,7 @@ class Wave(Dependence):
 
     def near(self, width: float) -> list[Dependence]:
         """Return dependences of another shape nearby."""
-        steps = np.linspace(-1.0, 1.0, 5) * width * self.apart
+        steps = np.linspace(-1.0, 1.0, 5) * width * self.apart  # numerical
         return [replace(self, cycles=self.cycles + float(step)) for step in steps]
 
     def values(self, state: RigState) -> _Floats:
@@ -349,7 +345,9 @@ class Memory(Dependence):
     def roots(self) -> tuple[_Floats, ...]:  # type: ignore[override]
         """Roots of the prior covariance, one for each length scale."""
         lags = np.array(self.lags_s)
-        return np.hstack([_covariance_root(lags, LOCATED.lag_length_s), _ROUGH * np.eye(len(lags))]), np.eye(len(lags))
+        return np.hstack([_covariance_root(lags, LOCATED.lag_length_s), LOCATED.rough * np.eye(len(lags))]), np.eye(
+            len(lags)
+        )
 
     def values(self, state: RigState) -> _Floats:
         """Return the functions at the samples."""
@@ -421,14 +419,14 @@ class Mode(Dependence):
 
     def near(self, width: float) -> list[Dependence]:
         """Return dependences of another shape nearby."""
-        faster, damped = np.exp(_FASTER * width * np.arange(-2, 3)), np.exp(width * np.arange(-1, 2))
+        faster, damped = np.exp(LOCATED.spacing * width * np.arange(-2, 3)), np.exp(width * np.arange(-1, 2))
         pairs = [(self.frequency_hz * f, self.damping * z) for f in faster for z in damped]
         return [replace(self, frequency_hz=float(f), damping=float(min(z, 1.0))) for f, z in pairs]
 
     @property
     def memory_s(self) -> float:  # type: ignore[override]
         """How long it remembers the drive, s."""
-        return _FORGOTTEN / (2.0 * np.pi * self.frequency_hz * self.damping)
+        return LOCATED.forgotten / (2.0 * np.pi * self.frequency_hz * self.damping)
 
     @property
     def roots(self) -> tuple[_Floats, ...]:

@@ -29,7 +29,6 @@ from gfimu.diagnosis.terms.located.policy import LOCATED
 
 __all__ = ["Operator", "Place", "channel_place", "rig_places"]
 
-_Z = np.array([0.0, 0.0, 1.0])  # numerical: the axis of the table
 _Floats = NDArray[np.float64]
 _Groups = tuple[tuple[int, ...], ...]
 
@@ -124,6 +123,11 @@ def channel_place(name: str, kind: str, groups: _Groups, labels: Sequence[str]) 
     return Place(name, kind, words.format(few), unit, usual, tuple(labels), partial(operators, groups))
 
 
+def _across(vectors: _Floats) -> _Floats:
+    """Return the axis of the table × vectors (c, 3)."""
+    return np.cross(np.array([0.0, 0.0, 1.0]), vectors)
+
+
 def _turned_back(state: RigState, vector: _Floats) -> _Floats:
     """Return a vector of the room (3,) in the turning frame, shape (n, 3)."""
     cos, sin = np.cos(state.spin.angle), np.sin(state.spin.angle)
@@ -143,8 +147,8 @@ def _observed(channels: _Floats, reference: _Floats | float = 0.0) -> _Floats:
 def _of_moved(state: RigState, moved: _Floats) -> tuple[_Floats, _Floats, _Floats]:
     """Return A, B and C (n, c) of chips that move by φ times vectors (c, 3)."""
     axes, rate = state.placed.axes, state.spin.rate
-    across = np.cross(_Z, moved)
-    beside, inward = _along(axes, across), _along(axes, np.cross(_Z, across))
+    across = _across(moved)
+    beside, inward = _along(axes, across), _along(axes, _across(across))
     of_value = np.outer(state.spin.acceleration, beside) + np.outer(rate**2, inward)
     return of_value, np.outer(2.0 * rate, beside), np.tile(_along(axes, moved), (len(rate), 1))
 
@@ -163,8 +167,8 @@ def _is_late(is_angle: bool, state: RigState) -> list[Operator]:
 
 
 def _turns(is_angle: bool, state: RigState) -> list[Operator]:
-    axes, across = state.placed.axes, np.cross(_Z, state.placed.places)
-    by_rate = np.outer(2.0 * state.spin.rate, _along(axes, np.cross(_Z, across)))
+    axes, across = state.placed.axes, _across(state.placed.places)
+    by_rate = np.outer(2.0 * state.spin.rate, _along(axes, _across(across)))
     by_acceleration = np.tile(_along(axes, across), (len(state.t), 1))
     of_angle = _observed(np.zeros_like(by_rate), float(is_angle))
     return [Operator(of_angle, _observed(by_rate, float(not is_angle)), _observed(by_acceleration))]
@@ -177,8 +181,8 @@ def _moves(state: RigState) -> list[Operator]:
 
 def _leans(state: RigState) -> list[Operator]:
     axes, places, spin = state.placed.axes, state.placed.places, state.spin
-    across = np.cross(_Z, places)
-    inward = np.cross(_Z, across)
+    across = _across(places)
+    inward = _across(across)
     gravity = _turned_back(state, state.placed.gravity)
     operators = []
     for unit in np.eye(3)[:2]:
@@ -204,7 +208,7 @@ def _vibrates(state: RigState) -> list[Operator]:
 
 def _tilts(state: RigState) -> list[Operator]:
     axes, places = state.placed.axes, state.placed.places
-    gravity, across = _turned_back(state, state.placed.gravity), np.cross(_Z, places)
+    gravity, across = _turned_back(state, state.placed.gravity), _across(places)
     operators = []
     for unit in np.eye(3)[:2]:
         turned = _turned_back(state, unit)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 __all__ = ["LOCATED", "LocatedPolicy"]
@@ -16,6 +17,38 @@ class LocatedPolicy:
 
     Parameters
     ----------
+    log_prior : float
+        Log prior of a function at a place, as one of the many that have no name [nats]. Set in a prototype, where it
+        separated right names from descriptions of the same worlds.
+    free_odds : float
+        Log odds that an error that is free in time needs [nats]. Set on runs with nothing hidden, which reached 23.
+    most_certain_place : float
+        Largest probability of a place that is reported [1]. Set by the share of right places among worlds outside the
+        library.
+    terms, fitted, compared : int
+        Most terms, and how many leaders of each are fitted and compared under their own noise [count].
+    behind : float
+        Log odds behind the leader, and half of its own, from which a term is not fitted [nats].
+    widest : int
+        Coefficients of a term beyond which it describes anything [count].
+    least_prior, least_information : float
+        Share of the prior's variance below which it hardly allows a combination, and information below which a term is
+        not seen at all [1].
+    refined : int
+        Leaders whose shape (a frequency, a damping, an order) is refined [count].
+    widths : tuple of float
+        How wide the steps of that are, one after another [1].
+    stretches, samples : int
+        Stretches in which terms are searched, and most samples of each [count].
+    rows : int
+        Of the table of a function [count].
+    block_s, bands : float and int
+        Blocks of an error that is free in time [s], and its bands of frequency [count].
+    waves, padded, apart : int
+        Strongest waves of each kind at a place; length of the transform they are looked for in over that of its signal;
+        its points between two waves [count].
+    least_turned : float
+        Angle in which an order can be separated from a function of the angle [rad].
     rate_functions, acceleration_functions, angle_functions, time_functions, temperature_functions : int
         Splines of a smooth function of one regressor [count].
     reading_functions, product_functions, harmonics : int
@@ -37,6 +70,14 @@ class LocatedPolicy:
         Frequencies between them [count].
     damping : float
         Damping ratio of a mode at first [1].
+    spacing : float
+        Logarithm of the frequency between two modes that are tried, about [1].
+    forgotten : float
+        Time constants after which a mode has forgotten [1].
+    fastest : float
+        Share of the sample rate up to which a mode is sampled [1].
+    rough : float
+        Share of a filter that is independent from lag to lag [1].
     mode_looks, wave_looks : float
         What it costs to have chosen a mode, or a wave, among many [nats].
     warmed : float
@@ -50,6 +91,27 @@ class LocatedPolicy:
         a displacement, of a gain or a stretch, of an acceleration or an offset [in the units of their names].
     """
 
+    log_prior: float = -13.0
+    free_odds: float = 25.0
+    most_certain_place: float = 0.9
+    terms: int = 3
+    fitted: int = 4
+    compared: int = 2
+    behind: float = 40.0
+    widest: int = 320
+    least_prior: float = 1e-6
+    least_information: float = 1e-9
+    refined: int = 6
+    widths: tuple[float, ...] = (1.0, 0.3, 0.1, 0.03)
+    stretches: int = 2
+    samples: int = 20_000
+    rows: int = 25
+    block_s: float = 0.5
+    bands: int = 40
+    waves: int = 2
+    padded: int = 4
+    apart: int = 24
+    least_turned: float = 4.0 * math.pi
     rate_functions: int = 16
     acceleration_functions: int = 12
     angle_functions: int = 12
@@ -68,6 +130,10 @@ class LocatedPolicy:
     mode_hz: tuple[float, float] = (2.5, 40.0)
     modes: int = 15
     damping: float = 0.07
+    spacing: float = 0.15
+    forgotten: float = 3.0
+    fastest: float = 0.4
+    rough: float = 0.01
     mode_looks: float = 4.0
     wave_looks: float = 6.0
     warmed: float = 0.2

@@ -43,7 +43,7 @@ def humming():
 
 def test_a_tone_is_found_on_its_channel_to_a_tenth_of_what_can_be_separated(humming):
     stretches, point = humming
-    leaders = LocatedScreen(stretches, point, POLICY).leaders()
+    leaders = LocatedScreen(stretches, point).leaders()
     best = leaders[0].term
     assert (best.where.components, best.dependence.kind) == (("a32",), "tone")
     assert best.dependence.cycles == pytest.approx(17.321, abs=0.1 / 20.0)
@@ -54,15 +54,15 @@ def test_a_tone_is_found_on_its_channel_to_a_tenth_of_what_can_be_separated(humm
 
 def test_one_channel_of_twelve_and_a_wave_pay_for_having_been_chosen(humming):
     stretches, point = humming
-    best = LocatedScreen(stretches, point, POLICY).leaders()[0]
-    assert best.cause.log_prior == pytest.approx(POLICY.unnamed - LOCATED.wave_looks - np.log(12.0))
+    best = LocatedScreen(stretches, point).leaders()[0]
+    assert best.cause.log_prior == pytest.approx(LOCATED.log_prior - LOCATED.wave_looks - np.log(12.0))
 
 
 def test_a_channel_that_jumps_is_the_place_of_an_error_that_is_free_in_time():
     stretches, point = started(lambda t: np.outer(np.where((t > 6.0) & (t < 9.0), 0.2, 0.0), np.eye(12)[7]))
     best, *_ = free_time(stretches, point, POLICY)
     assert (best.where.components, best.pattern) == (("a32",), "one")
-    assert best.log_odds > POLICY.free_odds
+    assert best.log_odds > LOCATED.free_odds
 
 
 def test_the_signal_of_a_place_is_the_error_there_where_there_is_no_noise():

@@ -87,7 +87,7 @@ def test_unknown():
     assert "2 functions of absolute time are left out" in words[1]
     assert any(one.startswith("The residual falls") for one in words)
     none = told("unknown", unexplained=Unexplained(True, "x"), terms=0)
-    assert none[1].startswith("No function of the motion, the angle or time predicts it")
+    assert none[1].startswith("No function that is added to channels or reference predicts it")
     assert not any("significant residual remains" in one for one in (*words, *none))
 
 
