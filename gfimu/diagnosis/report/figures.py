@@ -49,6 +49,14 @@ _MANY = 24  # channels, of more of which pictures are coarser so that the page s
 _MOST_POINTS = 4000
 _MOST_FREQUENCIES = 1200
 _COARSE_DPI = 55
+_QUANTITIES = {
+    "rad/s": "rate",
+    "rad/s²": "angular acceleration",
+    "rad": "angle",
+    "s": "time",
+    "°C": "temperature",
+    "K/s": "warming",
+}
 _VIEW = (4.4, 2.4)  # inches: letters are legible where a view is as narrow as a telephone
 
 
@@ -140,8 +148,8 @@ def dependence_figure(dependence: Dependence, array: AccelerometerArray) -> str:
         return svg_text(figure)
 
 
-def function_figure(function: FunctionTable) -> str:
-    """Draw an unknown function with its band of ±2σ."""
+def function_figure(function: FunctionTable, what: str) -> str:
+    """Draw an unknown function of an error, such as an offset, with its band of ±2σ."""
     x, f, std = (np.array(column) for column in (function.x, function.f, function.std))
     with mpl.rc_context(ON_PAGE):
         figure = Figure(figsize=_VIEW, layout="constrained")
@@ -149,8 +157,8 @@ def function_figure(function: FunctionTable) -> str:
         axis.axhline(0.0, color=_NOISE, linewidth=0.6)
         axis.fill_between(x, f - 2.0 * std, f + 2.0 * std, color=_PALE, alpha=0.8, linewidth=0)
         axis.plot(x, f, color=_BEFORE, linewidth=1.3)
-        axis.set_xlabel(function.x_unit)
-        axis.set_ylabel("ratio" if function.unit == "1" else function.unit)
+        axis.set_xlabel(f"{_QUANTITIES.get(function.x_unit, 'of')}, {function.x_unit}")
+        axis.set_ylabel(what if function.unit == "1" else f"{what}, {function.unit}")
         return svg_text(figure)
 
 

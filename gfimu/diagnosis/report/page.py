@@ -190,7 +190,7 @@ def _located(one: Located, array: AccelerometerArray) -> Mapping[str, Any]:
         "text": one.text[0].upper() + one.text[1:],
         "probability": percent(one.place_probability),
         "instead": one.instead,
-        "picture": "" if one.function is None else _picture(figures.function_figure(one.function), array),
+        "picture": "" if one.function is None else _picture(figures.function_figure(one.function, one.what), array),
     }
 
 

@@ -157,11 +157,14 @@ def _function(cause: Cause, term: LocatedTerm, state: RigState) -> tuple[Functio
     of = term.dependence.abscissa
     at = int(np.argmax(np.abs(values[largest])))
     size = _amount(float(values[largest, at]), term.where.unit)
+    size += f" in {term.where.components[largest]}" if components > 1 else ""
     if of is None:
         return None, f" (up to {size})"
     x = of.of(state)
-    rows = np.unique(np.argsort(x)[np.linspace(0, len(x) - 1, LOCATED.rows).round().astype(int)])
-    rows = rows[np.argsort(x[rows])]
+    order = np.argsort(x)
+    even = np.linspace(x[order[0]], x[order[-1]], LOCATED.rows)
+    rows = np.unique(np.minimum(np.searchsorted(x[order], even), len(x) - 1))
+    rows = order[rows]
     mixing = cause.mixing[largest * count : (largest + 1) * count] * term.where.usual
     spread = basis[rows] @ mixing  # (rows, k)
     std = np.sqrt(np.maximum(np.einsum("nk,kl,nl->n", spread, cause.covariance, spread), 0.0))
