@@ -23,8 +23,8 @@ class LocatedPolicy:
     free_odds : float
         Log odds that an error that is free in time needs [nats]. Set on runs with nothing hidden, which reached 23.
     most_certain_place : float
-        Largest probability of a place that is reported [1]. Set by the share of right places among worlds outside the
-        library.
+        Largest probability of a place that is reported [1]. Set by 24 worlds outside the library, of which 20 places
+        were right; all of them were far ahead of others by the evidence.
     terms, fitted, compared : int
         Most terms, and how many leaders of each are fitted and compared under their own noise [count].
     behind : float
@@ -93,7 +93,7 @@ class LocatedPolicy:
 
     log_prior: float = -13.0
     free_odds: float = 25.0
-    most_certain_place: float = 0.9
+    most_certain_place: float = 0.85
     terms: int = 3
     fitted: int = 4
     compared: int = 2

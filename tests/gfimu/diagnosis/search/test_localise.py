@@ -9,7 +9,7 @@ import pytest
 from few_effects import having
 
 from gfimu import AccelerometerArray
-from gfimu.diagnosis import Policy, localise, located, prepare, stretches_of
+from gfimu.diagnosis import LOCATED, Policy, localise, located, prepare, stretches_of
 from sim.effects import make_effect
 from sim.trials import Measurement, measure
 from sim.twin import Twin
@@ -31,7 +31,7 @@ def described(effects=(), *, seed=5, change=None):
 def test_a_reference_that_saturates_is_located_with_its_form_and_size():
     (found,) = described([("reference_rate_cubed", {"error_rad_s_per_rad3_s3": 1e-4})])
     assert (found.place, found.dependence, found.pattern) == ("reference", "omega^3", "all")
-    assert found.place_probability > 0.85
+    assert found.place_probability == pytest.approx(LOCATED.most_certain_place, abs=0.02)
     x, f, std = (np.array(column) for column in (found.function.x, found.function.f, found.function.std))
     assert (found.function.x_unit, found.function.unit) == ("rad/s", "rad/s")
     assert np.all(np.abs(f - 1e-4 * x**3) < 4.0 * std + 1e-9)
