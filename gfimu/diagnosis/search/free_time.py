@@ -1,7 +1,7 @@
 """Where something is wrong, without when: at each place the evidence of an error that is free in time.
 
-It needs no dependence, so that it finds the place of footsteps, of a floor that shakes, of a bias that jumps. The error
-is taken to be independent from block to block, in time or in frequency, with a variance of its own in each:
+Such an error needs no dependence, so the place of footsteps, of a floor that shakes or of a bias that jumps is found.
+It is modelled as independent from block to block, in time or in frequency, with a variance of its own in each:
 ½ n (v − 1 − ln v) nats for n samples of mean square v, less ½ ln n and a nat for having chosen v.
 """
 

@@ -21,11 +21,11 @@ from gfimu.diagnosis.search.free_time import FreeTime, free_time
 from gfimu.diagnosis.search.located_screen import Leader, LocatedScreen
 from gfimu.diagnosis.terms.located.policy import LOCATED
 
-__all__ = ["Localised", "Rival", "localise"]
+__all__ = ["ComparedTerm", "Localised", "localise"]
 
 
 @dataclass(frozen=True)
-class Rival:
+class ComparedTerm:
     """A located term that was compared with one that was taken, by the log odds, nats, that each adds."""
 
     leader: Leader
@@ -42,7 +42,7 @@ class Localised:
         The data.
     fit : Fit
         The terms at their optimum, beside no other cause.
-    rounds : tuple of tuple of Rival
+    rounds : tuple of tuple of ComparedTerm
         Of each term in the order of their growth: the term that was taken, and those that it was compared with.
     free : tuple of FreeTime
         Places of errors that are free in time beside these terms, best first.
@@ -50,7 +50,7 @@ class Localised:
 
     stretches: tuple[Stretch, ...]
     fit: Fit
-    rounds: tuple[tuple[Rival, ...], ...]
+    rounds: tuple[tuple[ComparedTerm, ...], ...]
     free: tuple[FreeTime, ...]
 
 
@@ -73,13 +73,13 @@ def localise(stretches: Sequence[Stretch], policy: Policy) -> Localised:
     point = learn_roughness(stretches, fit(stretches, starting_point(stretches, policy.knots), few).point, LEARNINGS)
     present = fit(stretches, point, few)
     least = _settled(stretches, present, policy).log_posterior
-    rounds: list[tuple[Rival, ...]] = []
+    rounds: list[tuple[ComparedTerm, ...]] = []
     while len(rounds) < LOCATED.terms:
         needed = max(policy.extra_odds, policy.dominant * rounds[0][0].log_odds) if rounds else policy.cause_odds
         compared = _compared(stretches, present, policy)
         if not compared or compared[0][1].log_posterior - least < needed:
             break
-        rounds.append(tuple(Rival(leader, found.log_posterior - least) for leader, found in compared))
+        rounds.append(tuple(ComparedTerm(leader, found.log_posterior - least) for leader, found in compared))
         present = compared[0][1]
         least = present.log_posterior
     return Localised(tuple(stretches), present, tuple(rounds), tuple(free_time(stretches, present.point, policy)))

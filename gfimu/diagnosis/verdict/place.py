@@ -16,7 +16,7 @@ from gfimu.diagnosis.data.table.rig_state import RigState
 from gfimu.diagnosis.fit.learn import predicted_by_reference
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.free_time import FreeTime
-from gfimu.diagnosis.search.localise import Localised, Rival, localise
+from gfimu.diagnosis.search.localise import ComparedTerm, Localised, localise
 from gfimu.diagnosis.terms.cause import Cause
 from gfimu.diagnosis.terms.located.policy import LOCATED
 from gfimu.diagnosis.terms.located.term import LocatedTerm
@@ -100,7 +100,7 @@ def located(found: Localised, policy: Policy) -> tuple[Located, ...]:
     return tuple(_of_term(cause, rivals, state, policy) for cause, rivals in pairs)
 
 
-def _of_term(cause: Cause, rivals: Sequence[Rival], state: RigState, policy: Policy) -> Located:
+def _of_term(cause: Cause, rivals: Sequence[ComparedTerm], state: RigState, policy: Policy) -> Located:
     """Return the description of a term, given what it was compared with."""
     best, *others = rivals
     term = best.leader.term

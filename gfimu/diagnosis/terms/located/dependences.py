@@ -254,7 +254,7 @@ class Wave(Dependence):
     cycles : float
         Cycles per revolution, or Hz.
     apart : float
-        How far two waves must be apart to be told from each other in the recording.
+        Least difference of two waves that the recording separates, in the unit of ``cycles``.
     of_time : bool
         Whether it is of time, and not of the angle.
     fastest : float

@@ -10,6 +10,7 @@ from gfimu.diagnosis import (
     LocatedEffect,
     LocatedTerm,
     RigState,
+    Wave,
     channel_place,
     dependences,
     located_columns,
@@ -105,6 +106,22 @@ def test_columns_are_the_derivative_by_the_coefficients(place, dependence):
     sizes = rng.standard_normal(term.count)
     added = LocatedEffect(term, term.where.usual * sizes).added(STATE)
     np.testing.assert_allclose(columns.times(sizes), added, rtol=0, atol=1e-9 * np.abs(added).max())
+
+
+def test_a_bench_shakes_as_the_exact_effect_does():
+    amplitude, cycles = 1e-3, 7.3
+    exact = change("bearing_shake", {"amplitude_m_s2_per_rad_s": amplitude, "order": cycles, "phase_rad": 0.0})
+    term = LocatedTerm(PLACES["shakes"], Wave(cycles, 0.1, fastest=1.0))
+    coefficients = np.zeros(term.count)
+    coefficients[-1] = amplitude  # the sine along the vertical
+    assert near(LocatedEffect(term, coefficients).added(STATE), exact) < 1e-9
+
+
+def test_an_array_vibrates_as_a_bench_does_whose_direction_turns_with_the_table():
+    (vibrates, *_), (along_x, along_y, _) = (PLACES[what].operators(STATE) for what in ("vibrates", "shakes"))
+    cos, sin = (wave(STATE.spin.angle)[:, None] for wave in (np.cos, np.sin))
+    turning = cos * along_x.of_value + sin * along_y.of_value
+    np.testing.assert_allclose(vibrates.of_value, turning, rtol=0, atol=1e-12)
 
 
 def test_a_smooth_function_can_be_any_of_its_regressor_and_goes_flat_beyond_what_was_seen():
