@@ -258,7 +258,7 @@ def _with_motion(data: Mapping[str, Any]) -> Mapping[str, Any]:
     """Return the content of a scenario; a twin file is given a motion, and what is of the diagnosis only left out."""
     if "motion" in data or not isinstance(data.get("drive"), Mapping) or "source" not in data["drive"]:
         return data
-    twin = {key: value for key, value in data.items() if key not in ("grammar", "carriage_axis")}
+    twin = {key: value for key, value in data.items() if key != "carriage_axis"}
     if str(data["drive"]["source"]).startswith("carriage"):
         motion = read_toml(find_model("scenarios", _CARRIAGE_MOTION))["motion"]
         return {"motion": motion | {"axis": data.get("carriage_axis", motion["axis"])}, **twin}

@@ -14,10 +14,10 @@ from gfimu.base.errors import InputError
 from gfimu.base.files.model_files import find_model, read_toml, set_key
 from gfimu.base.short_repr import short_repr
 from gfimu.base.units import STANDARD_GRAVITY
+from gfimu.model.located.effect import UNLISTED
 from gfimu.motion.earth import EarthRotation
 from sim.chips.adxl345 import SensorSettings
 from sim.effects import NOT_OF_A_CARRIAGE, Effect, apply_effects
-from sim.effects.unlisted import Unlisted
 from sim.motions.carried import Carriage
 from sim.motions.motion import BodyMotion, BodyState, SpinMotion
 from sim.rigs.dc_motor import DcMotor
@@ -185,9 +185,8 @@ def _refuse_table_keys(scenario: Scenario, source: str) -> None:
     nominal = replace(scenario, effects=()).world
     same = ("nod", "stretch", "leans", "shakes", "motion_steps", "mount_steps", "reference_steps")
     moved = ("cube_offset", "mount_rotvec", "axis_rotvec")
-    of_spin = any(isinstance(one, Unlisted) and one.dependence.function is not None for one in scenario.effects)
     if (
-        of_spin
+        any(one.name == UNLISTED for one in scenario.effects)
         or any(getattr(world, name) != getattr(nominal, name) for name in same)
         or any(not np.array_equal(getattr(world, name), getattr(nominal, name)) for name in moved)
     ):

@@ -23,9 +23,7 @@ from gfimu.base.files.schema import read
 from gfimu.base.short_repr import short_repr
 from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.model.world_model import (
-    BasisUnits,
     BodyModel,
-    EffectFamily,
     ExpectedNoise,
     PlacedArray,
     Spin,
@@ -40,7 +38,6 @@ from sim.effects import (
     BODY_EFFECTS,
     CARRIAGE_EFFECTS,
     ENCODER_EFFECTS,
-    FURTHER_EFFECTS,
     INCLINED_EFFECTS,
     TABLE_EFFECTS,
     Effect,
@@ -48,7 +45,7 @@ from sim.effects import (
     apply_effects,
 )
 from sim.effects.mechanical import Misalignment
-from sim.effects.unknown import UnknownTerm
+from sim.effects.unlisted import Unlisted
 from sim.twin_file import TwinFile
 from sim.world import World
 
@@ -85,9 +82,6 @@ class Twin:
         Extensions of the model; a nominal twin has none.
     array_name : str
         Array as named in the file.
-    grammar : bool
-        Whether a diagnosis searches the further effects of a rig and the points of the grammar at once; otherwise it
-        does so where the evidence asks for it.
     axis_inclination : float
         Angle between the table's axis and the vertical, rad: 0 of a level table, π/2 of a wheel or a pendulum. The
         axis leans about the world's x axis; at the angle zero that is the table's x axis too.
@@ -114,7 +108,6 @@ class Twin:
     full_resolution: bool = True
     effects: tuple[Effect, ...] = ()
     array_name: str = ""
-    grammar: bool = False
     axis_inclination: float = 0.0
     axis: TurningAxis | None = None
     carriage_axis: tuple[float, float, float] = (1.0, 0.0, 0.0)
@@ -152,7 +145,6 @@ class Twin:
             full_resolution=file.sensor.full_resolution,
             effects=tuple(table.effect(array, source) for table in file.effect),
             array_name=file.array,
-            grammar=file.grammar,
             axis_inclination=file.axis_inclination_rad if axis is None else axis.inclination or 0.0,
             axis=axis,
             carriage_axis=file.carriage_axis,
@@ -168,8 +160,6 @@ class Twin:
             "drive": {"source": self.drive_source},
             "sensor": {"part": self.part, "range_g": self.range_g, "full_resolution": self.full_resolution},
         }
-        if self.grammar:
-            data["grammar"] = True
         if self.axis is not None:
             del data["cube_offset_m"]
             data["mounting"] = self.axis.to_mounting()
@@ -252,10 +242,7 @@ class Twin:
         own = {"gyro": BODY_EFFECTS, "angle": ENCODER_EFFECTS}.get(self.drive_source, TABLE_EFFECTS)
         added = {name: one for name, one in added_effects().items() if self.drive_source in one.drive_sources}
         inclined = INCLINED_EFFECTS if self.axis_inclination and self.drive_source == "angle" else {}
-        library = {**own, **inclined, **added}
-        if self.grammar or self.drive_source == "gyro":
-            return library
-        return {name: family for name, family in library.items() if name not in FURTHER_EFFECTS}
+        return {**own, **inclined, **added}
 
     def _of_carriage(self) -> dict[str, type[Effect]]:
         """Return the effects of a linear axis; a single chip's misalignment is that of its mounting."""
@@ -263,19 +250,9 @@ class Twin:
         same = {Misalignment.name} if len(self.array.chips) == 1 else set()
         return {name: one for name, one in (CARRIAGE_EFFECTS | added).items() if name not in same}
 
-    def searching(self, *, wide: bool) -> Twin:
-        """Return the twin that searches the further effects and the grammar always, or only the usual effects."""
-        return replace(self, grammar=wide)
-
-    def unnamed(self, dependence: str, units: BasisUnits, *, of_reference: bool = False) -> EffectFamily:
-        """Return what no effect of the library explains as one more, with a size per channel or one of the reference.
-
-        Raises
-        ------
-        InputError
-            If no function has the name ``dependence``.
-        """
-        return UnknownTerm(dependence, units, of_reference)
+    def described(self, parameters: Mapping[str, Any]) -> Effect:
+        """Return an error without a name as an effect, from the parameters of `Unlisted`."""
+        return Unlisted(parameters)
 
     def predict(
         self,

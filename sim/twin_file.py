@@ -73,10 +73,6 @@ class TwinFile(Table, frozen=True):
         ),
     ] = None
     sample_rate_hz: Annotated[Positive, about("Nominal sample rate.", "Hz")] = 100.0
-    grammar: Annotated[
-        bool,
-        about("Whether a diagnosis searches the wider library at once, not only where it is needed."),
-    ] = False
     drive: Annotated[TwinDriveTable, about("Reference that drives the simulated rig.")] = TwinDriveTable()
     sensor: Annotated[TwinSensorTable, about("How the chips are set up.")] = TwinSensorTable()
     effect: Annotated[tuple[EffectTable, ...], about("Extensions of the model; a nominal twin has none.")] = ()

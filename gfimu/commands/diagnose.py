@@ -10,7 +10,6 @@ gfimu diagnose run.parquet --twin cube12_turntable --out diagnosis
 # What the recording can show, first
 gfimu diagnose run.parquet --twin cube12_turntable --check
 # A rig known to be unusual
-gfimu diagnose run.parquet --twin cube12_turntable --grammar --out diagnosis
 # Two loggers with two clocks
 gfimu diagnose accel.csv --map mine.toml --reference tacho.csv --twin rig.toml --out diagnosis
 # A unit fresh from the bench
@@ -123,7 +122,6 @@ _OUT = Option(
     "Folder to write: verdict.json, twin.toml with its array, report.html, diagnosis.rrd.", "FILE", writes=FOLDER
 )
 _HELD_OUT = Option("Recording kept for measuring the gain; may be repeated.", "RUN", kind=list[Path], reads=True)
-_GRAMMAR = Option("Search the wider library of effects at once, not only where the usual one fails.")
 _LIMIT = options.TIME_LIMIT.also(". What is known by then is the result, and described so")
 _REFERENCE = Option("Reference of the first run on a clock of its own; aligned as by `gfimu join`.", "FILE", reads=True)
 _NAMES = Option("Names of the runs, for people; those of their files by default.", shell=False)
@@ -144,7 +142,6 @@ def diagnose(
     out: Annotated["str | Path | None", _OUT] = None,
     held_out: Annotated[given.Runs, _HELD_OUT] = (),
     calibration: given.CalibrationToApply = None,
-    grammar: Annotated[bool, _GRAMMAR] = False,
     force: Annotated[bool, options.FORCE] = False,
     allow_code: Annotated[bool, options.ALLOW_CODE] = False,
     time_limit: Annotated[float, _LIMIT] = _TIME_LIMIT_S,
@@ -194,13 +191,12 @@ def diagnose(
         from gfimu.diagnosis.report.folder import warn_of_omitted
 
         warn_of_omitted()
-    asked = as_twin(twin, allow_code=allow_code)
+    model = as_twin(twin, allow_code=allow_code)
     runs, unseen = (
-        [as_source(run, asked.array, column_map, max_memory=max_memory) for run in as_runs(group)]
+        [as_source(run, model.array, column_map, max_memory=max_memory) for run in as_runs(group)]
         for group in (recordings, held_out)
     )
     _refuse_fitted(runs, unseen)
-    model = asked.searching(wide=True) if grammar else asked
     unit = None if calibration is None else as_calibration(calibration)
     read, kept = ([as_calibrated_run(run, model.array, unit)[0] for run in group] for group in (runs, unseen))
     if unit is not None and unit.positions:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -11,12 +11,10 @@ from gfimu.diagnosis.data.body.prepared import prepare_bodies
 from gfimu.diagnosis.data.prepared_runs import PreparedRuns
 from gfimu.diagnosis.fit.learn import predicted_by_reference
 from gfimu.diagnosis.fit.parallel import one_blas_thread
-from gfimu.diagnosis.one_library import STAGES, WIDER, LibraryDiagnosis, Report, interrupted, stretches_of
 from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.search.nuisance_models import Understanding
+from gfimu.diagnosis.steps import Report, Steps, stretches_of
 from gfimu.diagnosis.time_limit import limited_to, unlimited, what_ended
-from gfimu.diagnosis.verdict.library import with_wider_library
-from gfimu.diagnosis.verdict.place import with_place
+from gfimu.diagnosis.verdict.likely_mistakes import with_mistake
 from gfimu.diagnosis.verdict.sample_notes import with_sample_notes
 from gfimu.diagnosis.verdict.verdict import Diagnosis
 from gfimu.model.world_model import WorldModel
@@ -82,20 +80,33 @@ def diagnose(
         with unlimited():  # without the samples nothing is known
             prepared = prepare(recordings, model, labels, settings, force=force)
             kept = prepare(held_out, model, held_labels, settings, force=force) if held_out else None
+        steps = Steps(prepared, kept, model, settings, progress)
         try:
-            found = _by_stages(prepared, kept, model, settings, progress)
+            found = _verdict(steps)
+            if not found.interrupted:
+                found = with_mistake(found, stretches_of(model, prepared), prepared.runs)
         except np.linalg.LinAlgError as error:
             runs = ", ".join(labels)
             raise InputError(
                 f"{runs}: the equations of this run have no solution ({error}); are the readings and the reference of "
                 "the same run, in the units that the file says?"
             ) from error
-        if not found.interrupted:
-            try:
-                found = with_place(found, stretches_of(model, prepared), prepared.runs, settings)
-            except KeyboardInterrupt as stop:
-                found = interrupted(found, STAGES[-1], what_ended(stop))
         return with_sample_notes(found, prepared.runs)
+
+
+def _verdict(steps: Steps) -> Diagnosis:
+    """Return the verdict; where it is interrupted what is known by then."""
+    understanding = None
+    try:
+        understanding = steps.understood()
+        by = understanding.explanation.interrupted
+        if not by:
+            understanding = steps.challenged(understanding)
+            return steps.verdict(understanding)
+    except KeyboardInterrupt as stop:
+        by = what_ended(stop)
+    with unlimited():
+        return steps.so_far(understanding, by)
 
 
 def prepare(
@@ -111,67 +122,3 @@ def prepare(
         recordings = [with_axis_gyro(reference_on_rows(recording), model.array) for recording in recordings]
         return prepare_bodies(recordings, model, names, spike_share=policy.body_spike_share)
     return PreparedRuns.build(recordings, model, names, predicted_by_reference, force=force)
-
-
-def _by_stages(
-    prepared: PreparedRuns, kept: PreparedRuns | None, model: WorldModel, policy: Policy, report: Report
-) -> Diagnosis:
-    """Return the verdict by the usual library, or by the wider one where the evidence is for that.
-
-    The wider library is searched where the usual one holds no answer, and where one of its effects is the more probable
-    in a linear world, its prior included.
-    """
-    wide = model.searching(wide=True)
-    further = wide.families().keys() - model.families().keys()
-    end = 0.5 if further else 1.0  # of the progress that is reported
-    usual = LibraryDiagnosis(prepared, kept, model, policy, lambda share, text: report(end * share, text))
-    found, understanding = _verdict(usual)
-    if found.interrupted or understanding is None or not further:
-        return found
-    wider = LibraryDiagnosis(
-        prepared, kept, wide, policy, lambda share, text: report(end + (1.0 - end) * share, f"wider library: {text}")
-    )
-    try:
-        least = policy.ambiguous - policy.worth_a_search
-        if found.verdict != "unknown" and wider.promise(understanding, further) < least:
-            return found
-        # The biases and the calibration are the same ones: a model of them that lost will not win beside rarer causes.
-        other, instead = _verdict(wider, {understanding.model})
-    except KeyboardInterrupt as stop:
-        return interrupted(found, WIDER, what_ended(stop))
-    if other.interrupted is not None:
-        return interrupted(found, WIDER, other.interrupted.by)
-    if other.verdict == "nothing_found" or instead is None:
-        return found
-    if "unknown" in (found.verdict, other.verdict):
-        better = _worth(other) > _worth(found)
-    else:  # what the gate withdrew has no evidence
-        better = any(cause.effect in further for cause in other.causes)
-        better &= instead.log_posterior - understanding.log_posterior > policy.ambiguous
-    return with_wider_library(other) if better else found
-
-
-def _verdict(
-    library: LibraryDiagnosis, models: Collection[str] | None = None
-) -> tuple[Diagnosis, Understanding | None]:
-    """Return the verdict by a library, and what its search found; where it is interrupted what is known by then."""
-    understanding = None
-    try:
-        understanding = library.understood(models)
-        by = understanding.explanation.interrupted
-        if not by:
-            return library.verdict(understanding), understanding
-    except KeyboardInterrupt as stop:
-        by = what_ended(stop)
-    with unlimited():
-        return library.so_far(understanding, by), understanding
-
-
-def _worth(found: Diagnosis) -> float:
-    """Return how far a verdict answers: the probability that the library holds the truth, less where it is unknown.
-
-    Of two descriptions of what is unknown that counts which removes more of the error on validation data.
-    """
-    if found.verdict == "unknown":
-        return min(float(np.nan_to_num(found.gain.share_of_excess_removed)), 1.0) - 2.0
-    return 1.0 if np.isnan(found.library_probability) else found.library_probability

@@ -1,4 +1,4 @@
-"""A generic basis: smooth functions of the motion, the angle and time, to find and to describe what has no name.
+"""A generic basis: smooth functions of the motion, the angle and time, as the effect ``unknown`` takes them.
 
 Rate, acceleration and time enter in units of their largest values, so that every function is of order one.
 """
@@ -14,19 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.base.errors import unknown_name
-from gfimu.model.world_model import BasisUnits, SpinState
+from gfimu.model.world_model import SpinState
 
 __all__ = [
     "FUNCTIONS",
     "OF_READING",
     "UNIT_KEYS",
+    "BasisUnits",
     "Motion",
     "basis_function",
     "is_of_time",
-    "ripples",
-    "step_at",
-    "tone",
-    "unit_parameters",
 ]
 
 Function = Callable[["Motion"], NDArray[np.float64]]
@@ -40,6 +37,15 @@ UNIT_KEYS = {"rate_unit_rad_s": "rad/s", "acceleration_unit_rad_s2": "rad/s²", 
 
 OF_READING = "reading³"
 """The one function that is another one in every channel."""
+
+
+@dataclass(frozen=True)
+class BasisUnits:
+    """What rate (rad/s), acceleration (rad/s²) and time (s) are divided by in a generic basis; all positive."""
+
+    rate: float
+    acceleration: float
+    duration: float
 
 
 @dataclass(frozen=True)
@@ -119,7 +125,7 @@ def _functions() -> dict[str, Function]:
 
 
 FUNCTIONS: Mapping[str, Function] = _functions()
-"""The functions that what is left is tested for, by name."""
+"""The functions by name."""
 
 _FAMILIES = (
     *("N per revolution (sine)", "N per revolution × rate (cosine)", "N per revolution × rate² (sine)"),
@@ -128,26 +134,6 @@ _FAMILIES = (
 _TONE_NAME = re.compile(r"tone at (\d+(?:\.\d+)?) Hz \((sine|cosine)\)")
 _RIPPLE_NAME = re.compile(r"(\d{1,3}) per revolution(?: × rate²?)? \((?:sine|cosine)\)")
 _STEP_NAME = re.compile(r"step at (\d+(?:\.\d+)?) s")
-
-
-def tone(frequency: float, wave: str) -> str:
-    """Return the name of a tone at a frequency, Hz: a ``"sine"`` or a ``"cosine"`` of the time since the start."""
-    return f"tone at {frequency:.5f} Hz ({wave})"
-
-
-def ripples(order: int) -> tuple[str, ...]:
-    """Return the names of the functions that turn so many times per revolution."""
-    return tuple(_ripples((order,)))
-
-
-def step_at(time: float) -> str:
-    """Return the name of a step at a time since the start, s."""
-    return f"step at {time:.3f} s"
-
-
-def unit_parameters(units: BasisUnits) -> dict[str, float]:
-    """Return units as parameters by the keys of `UNIT_KEYS`."""
-    return dict(zip(UNIT_KEYS, (units.rate, units.acceleration, units.duration), strict=True))
 
 
 def is_of_time(name: str) -> bool:

@@ -17,9 +17,7 @@ from gfimu.array.array import AccelerometerArray
 from gfimu.motion.body_drive import BodyDrive
 
 __all__ = [
-    "BasisUnits",
     "BodyModel",
-    "Dependence",
     "Effect",
     "EffectFamily",
     "ExpectedNoise",
@@ -31,7 +29,6 @@ __all__ = [
     "Whitened",
     "WorldModel",
     "acts_back",
-    "dependence_of",
     "is_linear",
     "is_of_one_recording",
     "is_of_wiring",
@@ -111,24 +108,6 @@ class Effect(Protocol):
         ...
 
 
-class Dependence(Protocol):
-    """What an effect without a name of its own goes with: a function of the motion."""
-
-    @property
-    def name(self) -> str: ...  # noqa: D102
-    @property
-    def words(self) -> str: ...  # noqa: D102
-    def of(self, spin: SpinState) -> NDArray[np.float64]:
-        """Return the function of a spin, shape (n,); zeros where it is one of something else."""
-        ...
-
-
-def dependence_of(family: EffectFamily) -> Dependence | None:
-    """Return what an effect goes with that has no name of its own; None of those that have one."""
-    found: Dependence | None = getattr(family, "dependence", None)
-    return found
-
-
 def is_of_one_recording(family: EffectFamily) -> bool:
     """Whether a kind of effect has the phase of a clock that no other recording shares; others need not say so."""
     return bool(getattr(family, "of_one_recording", False))
@@ -177,8 +156,7 @@ class EffectFamily(Protocol):
     alone), ``alike_by_lot`` (chips of one lot have nearly the same sizes), ``contained_in`` (effects that can do all
     that it does), ``level_error`` (to which a level of a reading is found at best, in units of its white noise),
     ``memory_s``, ``acts_back`` (`acts_back`), ``rarity`` (`prior_of`) and, of a fault of the samples,
-    ``channel_order`` of an effect, ``scan`` (`shapes_to_screen`), and of a point of a grammar that has no name of its
-    own ``grammar_place`` and ``dependence`` (`Dependence`).
+    ``channel_order`` of an effect, ``scan`` (`shapes_to_screen`).
     """
 
     @property
@@ -286,15 +264,6 @@ class PlacedArray:
 
 
 @dataclass(frozen=True)
-class BasisUnits:
-    """What rate (rad/s), acceleration (rad/s²) and time (s) are divided by in a generic basis; all positive."""
-
-    rate: float
-    acceleration: float
-    duration: float
-
-
-@dataclass(frozen=True)
 class Whitened:
     """What a stretch leaves unexplained, whitened: its product with any column is that column's score.
 
@@ -341,12 +310,8 @@ class WorldModel(Protocol):
         """Return all kinds of effects it could have, by name."""
         ...
 
-    def searching(self, *, wide: bool) -> WorldModel:
-        """Return the model with all that may be wrong with a rig among its families, or with the usual effects."""
-        ...
-
-    def unnamed(self, dependence: str, units: BasisUnits, *, of_reference: bool = False) -> EffectFamily:
-        """Return what no effect of the library explains as one more: a function of `generic_basis` per channel."""
+    def described(self, parameters: Mapping[str, Any]) -> Effect:
+        """Return an error without a name as an effect (`gfimu.model.located.effect.LocatedEffect.parameters`)."""
         ...
 
     def predict(

@@ -11,7 +11,7 @@ from gfimu.base.plugins import plugins
 from sim.effects import body, chain, digital, drifting, mechanical, mounting, rig, sensing, timing
 from sim.effects.base import Effect
 from sim.effects.unknown import Unknown
-from sim.effects.unlisted import UNLISTED
+from sim.effects.unlisted import Unlisted
 from sim.world import World
 
 __all__ = [
@@ -78,8 +78,8 @@ _OF_RIG: tuple[type[Effect], ...] = (
     drifting.ColdStart,
 )
 
-FURTHER_EFFECTS: dict[str, type[Effect]] = {**{effect.name: effect for effect in _OF_RIG}, **UNLISTED}
-"""What a rig on its table may have besides: further effects with a name, and the points of the grammar."""
+FURTHER_EFFECTS: dict[str, type[Effect]] = {effect.name: effect for effect in _OF_RIG}
+"""What a rig on its table may have besides, by names that the first table of the contract has not."""
 
 INCLINED_EFFECTS: dict[str, type[Effect]] = {timing.AngleZero.name: timing.AngleZero}
 """What a rig whose axis leans may have besides, where its reference is an angle: gravity shows the angle itself."""
@@ -108,10 +108,7 @@ BODY_EFFECTS: dict[str, type[Effect]] = {
 NOT_OF_AN_ENCODER: dict[str, str] = {
     "tacho_scale": "the marks of an encoder are counted, its full turn has no gain",
     "tacho_ripple": "the modulation of a rate; an angle has none",
-    **dict.fromkeys(
-        ("tacho_lag", *(name for name, point in UNLISTED.items() if point.place == "reference")),
-        "the error of a rate; an angle has its own",
-    ),
+    "tacho_lag": "the error of a rate; an angle has its own",
 }
 """Effects that a diagnosis of a table whose reference is an angle does not look for, and why."""
 
@@ -124,7 +121,7 @@ NOT_OF_A_CARRIAGE: dict[str, str] = {
     "mount_tilt": "the array may be turned about all three axes: mount_turn",
     "tacho_scale": "steps are counted, and the pitch of belt or screw is known better than the gain of a chip",
     **dict.fromkeys(
-        (*(one.name for one in _OF_RIG if one.name not in ("chip_delay", "chip_lag", "cold_start")), *UNLISTED),
+        (one.name for one in _OF_RIG if one.name not in ("chip_delay", "chip_lag", "cold_start")),
         "an effect of a table that turns",
     ),
 }
@@ -174,7 +171,7 @@ def make_effect(
 ) -> Effect:
     """Build an effect by name; raises `InputError` for an unknown name or, given the array, an unknown key."""
     known = CARRIAGE_EFFECTS | TABLE_EFFECTS | BODY_EFFECTS | INCLINED_EFFECTS | SIMULATED_EFFECTS
-    known = known | {Unknown.name: Unknown}
+    known = known | {one.name: one for one in (Unknown, Unlisted)}
     if name not in known:
         known = known | added_effects()
     check_name("effect", name, known)
@@ -197,6 +194,7 @@ _CHAIN = (
     ),
     *("cross_axis", "scale_factor", "gain_drift", "quadratic", "vibration_rectification", "hysteresis"),
     *("bias", "bias_temperature", "warm_up", "cold_start", "interference_tone", "sensor_lag", "proof_mass", "unknown"),
+    "unlisted",
 )
 
 

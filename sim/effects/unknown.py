@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
@@ -13,13 +11,13 @@ from numpy.typing import NDArray
 from gfimu.array.array import AccelerometerArray
 from gfimu.base.errors import InputError
 from gfimu.base.units import STANDARD_GRAVITY
-from gfimu.model.generic_basis import OF_READING, UNIT_KEYS, Motion, basis_function, is_of_time, unit_parameters
+from gfimu.model.generic_basis import OF_READING, UNIT_KEYS, BasisUnits, Motion, basis_function, is_of_time
 from gfimu.model.parameter_units import NAME
-from gfimu.model.world_model import BasisUnits, SpinState
-from sim.effects.base import Effect, Pattern, Size
+from gfimu.model.world_model import SpinState
+from sim.effects.base import Effect, Size
 from sim.world import SampleContext, World
 
-__all__ = ["Unknown", "UnknownTerm"]
+__all__ = ["Unknown"]
 
 _REFERENCE = Size("reference_rad_s", "rad/s", 0.1)
 _USUAL = 0.1  # m/s²
@@ -38,8 +36,7 @@ class Unknown(Effect):
     :example: dependence = 'rate', rate_unit_rad_s = 10.0, a11_m_s2 = 0.1, a22_m_s2 = -0.05
     :experiment: Record another run with another motion. What stays the same function of the motion is in the rig or the
         sensors; what does not is an event.
-    :rivals: A diagnosis adds it last, where the causes that it found leave a lack of fit. Its functions are then chosen
-        one by one, where they make the data most probable.
+    :rivals: A diagnosis describes what has no name by ``unlisted``.
     """
 
     name = "unknown"
@@ -99,54 +96,3 @@ class Unknown(Effect):
         if of_reference:
             world = world.changed(reference_steps=(*world.reference_steps, refer))
         return world
-
-
-@dataclass(frozen=True)
-class UnknownTerm:
-    """One function as a family of effects: its sizes are those of the channels, or the one of the reference."""
-
-    dependence: str
-    units: BasisUnits
-    of_reference: bool = False
-
-    name = Unknown.name
-    summary = Unknown.summary
-    separated_by = Unknown.separated_by
-    place = Unknown.place
-    per_run = False
-    inexactness = 0.0
-    starts: tuple[float, ...] = ()
-
-    @property
-    def of_one_recording(self) -> bool:
-        """Whether the function is of absolute time, which another recording has otherwise."""
-        return is_of_time(self.dependence)
-
-    def __call__(self, parameters: Mapping[str, Any]) -> Effect:
-        """Build the effect from its coefficients."""
-        return Unknown({"dependence": self.dependence, **unit_parameters(self.units), **parameters})
-
-    def sizes(self, array: AccelerometerArray) -> tuple[Size, ...]:
-        """Return the sizes of the channels, or the one of the reference."""
-        return (_REFERENCE,) if self.of_reference else Unknown.sizes(array)[:-1]
-
-    def parameter_units(self, array: AccelerometerArray) -> dict[str, str]:
-        """Return the unit of each parameter."""
-        return Unknown.parameter_units(array)
-
-    def patterns(self, array: AccelerometerArray) -> tuple[Pattern, ...]:
-        """Return one pattern: every size free."""
-        return (Pattern("", np.eye(len(self.sizes(array)))),)
-
-    def reach(self, array: AccelerometerArray) -> NDArray[np.bool_] | None:
-        """Return that each size changes its own channel."""
-        return None if self.of_reference else np.eye(array.n_channels, dtype=bool)
-
-    def shapes(self, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:
-        """Return no shape."""
-        return ({},)
-
-    def from_sizes(self, array: AccelerometerArray, values: NDArray[np.float64], shape: Mapping[str, float]) -> Effect:
-        """Build the effect from its coefficients; those that are zero are left out."""
-        keys = [size.key for size in self.sizes(array)]
-        return self({key: float(value) for key, value in zip(keys, values, strict=True) if value})

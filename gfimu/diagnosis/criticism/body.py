@@ -21,30 +21,26 @@ __all__ = ["body_functions", "motion_noise", "tone"]
 _STEPS = 8  # numerical: parts of a run at whose edges a step is looked for
 _WINDOW = 1024  # numerical: samples in which an oscillator that is not steady is a line
 _NEIGHBOURS = 41  # numerical: frequencies about a line that give its background
-_DISAGREE = "every channel: disagreement per rate of change of the reading, s"
-_LOST = "angular acceleration missed by the gyro: rad/s² per m/s³ of change"
 
 
 def motion_noise(stretches: Sequence[BodyStretch], levels: Sequence[BodyNoise], policy: Policy) -> LackOfFit:
     """Return the noise that grows with the motion, which no effect of the library is."""
     noise = max(levels, key=lambda one: one.log_odds)
     if noise.log_odds <= policy.lack_odds:
-        return LackOfFit(-np.inf, "", {})
-    parts, surrogate = [], {}
+        return LackOfFit(-np.inf, "")
+    parts = []
     if noise.agitation:
         parts.append(
             "the channels disagree from sample to sample in proportion to how fast their readings change, as if each "
             f"were sampled at an instant of its own, {1e3 * noise.agitation:.2g} ms rms apart"
         )
-        surrogate[_DISAGREE] = noise.agitation
     if noise.acceleration_slope:
         fast = [s.change[s.use & ~s.run.rest] for s in stretches]
         typical = noise.acceleration_slope * float(np.sqrt(np.mean(np.concatenate(fast) ** 2)))
         parts.append(
             f"the angular acceleration differs from what the gyro's samples say by {typical:.2g} rad/s² rms in motion"
         )
-        surrogate[_LOST] = noise.acceleration_slope
-    return LackOfFit(-np.inf, "; ".join(parts), surrogate, noise_odds=noise.log_odds)
+    return LackOfFit(-np.inf, "; ".join(parts), noise_odds=noise.log_odds)
 
 
 def body_functions(stretch: BodyStretch, drive: HandDrive) -> dict[str, NDArray[np.float64]]:
@@ -70,7 +66,7 @@ def tone(at: HandPosterior, policy: Policy) -> LackOfFit:
     spread = np.sqrt(at.levels.common(stretch.change_in_motion))
     left = np.where(stretch.use[:, None], at.without_errors / spread[:, None], 0.0)[:, stretch.alive]
     channels = [name for name, alive in zip(stretch.model.array.channels, stretch.alive, strict=True) if alive]
-    found = LackOfFit(-np.inf, "", {})
+    found = LackOfFit(-np.inf, "")
     for length in {len(left), min(_WINDOW, len(left))}:
         count = len(left) // length
         pieces = left[: count * length].reshape(count, length, -1)
@@ -96,9 +92,7 @@ def tone(at: HandPosterior, policy: Policy) -> LackOfFit:
                 sure = odds[:, :, channel].max(axis=1) > policy.lack_odds
                 low, top = tops[sure].min(initial=one), tops[sure].max(initial=one)
                 text += f", varying from {low:.3g} to {top:.3g} Hz" if top - low > 4 * frequency[1] else ""
-            found = LackOfFit(
-                float(odds[window, place, channel]), text, {f"{channels[channel]}: tone at {one:.4f} Hz": amplitude}
-            )
+            found = LackOfFit(float(odds[window, place, channel]), text)
     return found
 
 

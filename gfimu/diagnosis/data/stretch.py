@@ -16,10 +16,10 @@ from gfimu.diagnosis.data.cosine_basis import CosineBasis, NoiseLevels
 from gfimu.diagnosis.data.reference import difference_noise
 from gfimu.diagnosis.data.rounding import COARSE, NO_STEPS, Steps
 from gfimu.diagnosis.data.run import Run, smooth_rate
-from gfimu.diagnosis.data.table.rig_state import RigState, split
 from gfimu.diagnosis.data.table.spins import JoinedSpin, ScaledSpin, State
 from gfimu.diagnosis.data.table.start_angle import gravity_angle
 from gfimu.diagnosis.time_limit import check_time
+from gfimu.model.located.rig_state import RigState, split
 from gfimu.model.world_model import Effect, Spin, WorldModel, is_linear, is_of_wiring, reads_place
 
 __all__ = ["NoPredictionError", "RunUp", "Stretch", "finite_prediction", "make_stretches", "moved"]
@@ -238,9 +238,7 @@ class Stretch:
         readings: NDArray[np.float64],
         temperature: NDArray[np.float64] | None,
     ) -> RigState:
-        placed = self.model.placed(self.run.mounting)
-        if placed is None:
-            raise NoPredictionError("the simulation does not say how its array stands")
+        placed = None if is_linear(self.model) else self.model.placed(self.run.mounting)
         return RigState(t - self.start, motion.at(t), readings, temperature, self.run.sample_period, placed)
 
     def motion(self, effects: Sequence[Effect], drive: Spin) -> Spin:

@@ -26,7 +26,7 @@ from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.terms.cause import Cause, effects_of
 from gfimu.diagnosis.terms.jacobian import Jacobian
 
-__all__ = ["FEW", "SETTLED", "Fit", "determined", "fit", "is_rough", "linearly_without", "log_prior"]
+__all__ = ["FEW", "SETTLED", "Fit", "determined", "fit", "is_rough", "linearly_without", "log_prior", "precision"]
 
 FEW = 3
 """Numerical: steps of a fit whose only other unknown is a drive, or that is only looked at; rounds of such fits."""
@@ -207,7 +207,8 @@ def _layout(causes: Sequence[Cause]) -> tuple[NDArray[np.intp], NDArray[np.intp]
     return np.flatnonzero(kinds == 0), np.flatnonzero(kinds == 1)
 
 
-def _precision(causes: Sequence[Cause]) -> NDArray[np.float64]:
+def precision(causes: Sequence[Cause]) -> NDArray[np.float64]:
+    """Return the precision of the prior of the unknowns of causes, (P,)."""
     sizes, shapes = _layout(causes)
     precision = np.zeros(len(sizes) + len(shapes))
     precision[sizes], precision[shapes] = 1.0 / SCALES[-1] ** 2, 1.0 / _SHAPE_PRIOR**2
@@ -243,7 +244,7 @@ def _step(causes: Sequence[Cause], linear: Linear, least: float) -> tuple[NDArra
     pull = np.zeros(len(linear.score))
     pull[sizes] = -np.concatenate([cause.coordinates for cause in causes]) / SCALES[-1] ** 2
     right = linear.score + pull
-    information = linear.gram + np.diag(_precision(causes))
+    information = linear.gram + np.diag(precision(causes))
     if least:
         known, unknown = _split(causes, linear, least)
         away = np.zeros(len(right))
@@ -284,7 +285,7 @@ def _judged(stretches: Sequence[Stretch], point: Point, linear: Linear, steps: i
     positive = np.concatenate([cause.positive(array) for cause in causes])
     total = score + gram @ z
     evidence = volume - 0.5 * nothing + log_evidence(gram, total, positive)
-    information = linear.gram + np.diag(_precision(causes))
+    information = linear.gram + np.diag(precision(causes))
     if least:  # what is not determined has the spread of its prior
         known, unknown = _split(causes, linear, least)
         covariance = known @ inverse(known.T @ information @ known) @ known.T + unknown @ unknown.T

@@ -17,13 +17,11 @@ from gfimu.base.results.colours import (
     INK,
     NOISE_ON_PAPER,
     PALE,
-    chip_colour,
     css,
 )
 from gfimu.diagnosis.criticism.views.dependence import Dependence
 from gfimu.diagnosis.criticism.views.residual_spectrum import ResidualSpectrum
 from gfimu.diagnosis.criticism.views.residuals import ResidualSize, Whiteness
-from gfimu.diagnosis.criticism.views.rigid_motion import BandPower
 from gfimu.diagnosis.criticism.views.run_view import RunView
 from gfimu.diagnosis.verdict.parts import FunctionTable
 from gfimu.visual.page import PlotLimits
@@ -36,7 +34,6 @@ __all__ = [
     "dependence_figure",
     "function_figure",
     "rig_figures",
-    "rigid_figure",
     "spectrum_figure",
     "trace_figure",
     "whiteness_figure",
@@ -180,26 +177,6 @@ def spectrum_figure(spectrum: ResidualSpectrum) -> str:
             axis.set_xlim(0, float(spectrum.at[-1]))
         axis.set_xlabel("frequency, Hz" if spectrum.unit == "Hz" else spectrum.unit)
         axis.set_ylabel(spectrum.quantity)
-        _legend_above(axis)
-        return svg_text(figure)
-
-
-def rigid_figure(power: BandPower) -> str:
-    """Draw the power of the given simulation's residual in single chips, the whole array and a spin, over frequency."""
-    with mpl.rc_context(ON_PAGE):
-        figure = Figure(figsize=_VIEW, layout="constrained")
-        axis = figure.subplots()
-        axis.axhline(1.0, color=_NOISE, linestyle="--", label="noise")
-        parts = ((power.spin, "spin"), (power.array, "whole array"), (power.chips, "single chips"))
-        for index, (values, label) in enumerate(parts):
-            if np.isfinite(values).any():
-                axis.plot(
-                    power.frequency, values, color=css(chip_colour(index, on_paper=True)), linewidth=1.2, label=label
-                )
-        axis.set_xscale("log")
-        axis.set_yscale("log")
-        axis.set_xlabel("frequency, Hz")
-        axis.set_ylabel("power over that of noise")
         _legend_above(axis)
         return svg_text(figure)
 

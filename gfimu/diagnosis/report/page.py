@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +30,7 @@ from gfimu.diagnosis.report.plain_words import (
 )
 from gfimu.diagnosis.report.rig import DrawnRig
 from gfimu.diagnosis.report.zooming import dependence_plot, residual_plot, spectrum_plot
-from gfimu.diagnosis.verdict.parts import Located, NamedCause
+from gfimu.diagnosis.verdict.parts import NamedCause
 from gfimu.diagnosis.verdict.verdict import Diagnosis
 from gfimu.diagnosis.verdict.wording import SAME_SHARE
 from gfimu.visual.page import Packed, page_plots, page_style, page_text
@@ -59,7 +58,6 @@ _VIEWS = (
 )
 _NO_SHARE = "No sizeable share of the residual follows it beyond chance"
 _NO_LINE = "No line stands out beyond chance"
-_NO_PLACE = "No single chip, array or rotation stands out beyond chance"
 _NOISE = "It is: neighbouring samples agree no more than by chance"
 """What is written of a view that shows nothing."""
 _MOST_PARAMETERS = 14
@@ -110,10 +108,8 @@ def _content(diagnosis: Diagnosis, rig: DrawnRig) -> Mapping[str, Any]:
         "story": story(diagnosis),
         "sentences": diagnosis.sentences[1:],
         "figures_of_merit": _figures_of_merit(diagnosis),
-        "causes": [_cause(diagnosis, cause) for cause in diagnosis.causes],
-        "located": [_located(one, array) for one in diagnosis.unexplained.located],
-        "surrogate": _surrogate(diagnosis) if diagnosis.unexplained.significant else {},
-        "extended": diagnosis.unexplained.extends_twin,
+        "causes": [_cause(diagnosis, cause) for cause in diagnosis.causes if cause.unlisted is None],
+        "located": [_located(cause, array) for cause in diagnosis.causes if cause.unlisted is not None],
         "unexplained": diagnosis.unexplained,
         "rivals": diagnosis.rivals,
         "gain": diagnosis.gain,
@@ -184,26 +180,16 @@ def _array(diagnosis: Diagnosis, rig: DrawnRig) -> dict[str, Any]:
     }
 
 
-def _located(one: Located, array: AccelerometerArray) -> Mapping[str, Any]:
+def _located(cause: NamedCause, array: AccelerometerArray) -> Mapping[str, Any]:
     """Return the words and the picture of something that has a place and no name."""
+    one = cause.unlisted
+    assert one is not None
     return {
         "text": one.text[0].upper() + one.text[1:],
         "probability": percent(one.place_probability),
         "instead": one.instead,
         "picture": "" if one.function is None else _picture(figures.function_figure(one.function, one.what), array),
     }
-
-
-def _surrogate(diagnosis: Diagnosis) -> dict[str, Any]:
-    """Return the coefficients of a surrogate as a table: functions down, channels and the reference across."""
-    places = [key.split(": ", maxsplit=1) for key in diagnosis.unexplained.surrogate]
-    if not places or any(len(place) < 2 for place in places):
-        return {}
-    of = list(dict.fromkeys(series for series, _ in places))
-    rows: dict[str, list[str]] = {}
-    for (series, function), value in zip(places, diagnosis.unexplained.surrogate.values(), strict=True):
-        rows.setdefault(function, [""] * len(of))[of.index(series)] = f"{value:.3g}"
-    return {"columns": of, "rows": rows}
 
 
 def _share_in_any_recording(diagnosis: Diagnosis) -> str:
@@ -216,7 +202,7 @@ def _figures_of_merit(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
     """Return the numbers of the first screen: value, unit, what it is."""
     residual, gain = diagnosis.residual, diagnosis.gain
     merits = [(three_digits(residual.rms_before), "m/s²", "prediction error, simulation as given")]
-    if diagnosis.causes or diagnosis.unexplained.extends_twin:
+    if diagnosis.causes:
         merits.append((three_digits(residual.rms_after), "m/s²", "prediction error, extended"))
     merits.append((three_digits(residual.noise_floor), "m/s²", "the sensors' own noise"))
     if np.isfinite(gain.share_of_excess_removed):
@@ -266,20 +252,6 @@ def _views(diagnosis: Diagnosis, views: ResidualViews, plots: dict[str, Any], da
         if spectrum is not None:
             caption = "Rms over the channels beside that of noise; drawn at its peaks."
             show(title, spectrum, figures.spectrum_figure(spectrum), caption, _NO_LINE, spectrum_plot(spectrum, data))
-    if diagnosis.rigid is not None and diagnosis.rigid.combinations:
-        # The noise of the reference is a spin too: where nothing was found, a spin says nothing.
-        calm = diagnosis.rigid.place == "spin" and diagnosis.verdict == "nothing_found"
-        rigid = _RigidView("" if calm else diagnosis.rigid.sentence, len(diagnosis.rigid.excesses))
-        caption = "Power over that of noise, of the given simulation's residual, by what moves together."
-        show("whose motion is it?", rigid, figures.rigid_figure(diagnosis.rigid.power), caption, _NO_PLACE)
     caption = "Cumulative periodogram of each channel; that of noise stays in the band."
     show("is it noise?", views.whiteness, figures.whiteness_figure(views.whiteness), caption, _NOISE)
     return shown
-
-
-@dataclass(frozen=True)
-class _RigidView:
-    """Sentence and number of looks of the division of the residual."""
-
-    sentence: str
-    looks: int

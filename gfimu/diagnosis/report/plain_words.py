@@ -13,6 +13,7 @@ from gfimu.diagnosis.criticism.views.run_view import RunView
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.verdict.parts import NamedCause, NoiseLevels
 from gfimu.diagnosis.verdict.verdict import Diagnosis
+from gfimu.diagnosis.verdict.wording import SAME_SHARE
 from gfimu.model.parameter_units import NAME, NUMBER, RATIO, key_name
 
 __all__ = [
@@ -61,14 +62,15 @@ class ParameterText:
 
 def headline(diagnosis: Diagnosis) -> str:
     """Return the verdict in one sentence."""
-    found = [_short(diagnosis, cause) for cause in diagnosis.causes]
+    found = [_short(diagnosis, cause) for cause in diagnosis.causes if cause.unlisted is None]
+    nameless = [cause.unlisted.text for cause in diagnosis.causes if cause.unlisted is not None]
     match diagnosis.verdict:
         case "nothing_found" if diagnosis.calibration_residue:
             return "No single thing is wrong: the simulation's numbers are all a little off, as after a calibration."
         case "nothing_found":
             return "Nothing is wrong with the simulation that this recording could show."
         case "unknown":
-            return _of_unknown(diagnosis, found)
+            return _of_unknown(diagnosis, found, nameless)
         case "ambiguous":
             contested = [cause for cause in diagnosis.causes if cause.not_distinguishable_from] or diagnosis.causes
             names = dict.fromkeys(name for one in contested for name in (one.effect, *one.not_distinguishable_from))
@@ -79,22 +81,23 @@ def headline(diagnosis: Diagnosis) -> str:
         case _ if diagnosis.in_part:
             share = diagnosis.gain.share_of_excess_removed
             gone = f" ({percent(share)} of the error is gone)" if math.isfinite(share) else ""
-            return f"Found in part what the simulation leaves out: {_joined(found)}{gone}."
+            every = [*found, *(f"without a name, {text}" for text in nameless)]
+            return f"Found in part what the simulation leaves out: {_joined(every)}{gone}."
         case _ if len(found) == 1:
             return f"Found what the simulation leaves out: {found[0]}."
         case _:
             return f"Found {_count(len(found))} things that the simulation leaves out: {_joined(found)}."
 
 
-def _of_unknown(diagnosis: Diagnosis, found: list[str]) -> str:
+def _of_unknown(diagnosis: Diagnosis, found: list[str], nameless: list[str]) -> str:
     """Return the headline of an unknown verdict, given the causes that were found beside it in words."""
     unexplained = diagnosis.unexplained
     if diagnosis.interrupted:
         return diagnosis.sentences[0]
     if unexplained.mistake:
         return f"The files do not fit these data: {unexplained.mistake}."
-    if unexplained.located:
-        text = f"is wrong that has no name in the library: {unexplained.located[0].text}."
+    if nameless:
+        text = f"is wrong that has no name in the library: {nameless[0]}."
         return f"Found: {_joined(found)}. Something else {text}" if found else f"Something {text}"
     if found:
         return f"Found: {_joined(found)}. Something else is real too, and nothing in the library explains it."
@@ -103,7 +106,7 @@ def _of_unknown(diagnosis: Diagnosis, found: list[str]) -> str:
 
 def summary(diagnosis: Diagnosis, cause: NamedCause) -> str:
     """Return what is wrong according to a cause, in the effect's own words, and where."""
-    family = diagnosis.twin.searching(wide=True).families().get(cause.effect)
+    family = diagnosis.twin.families().get(cause.effect)
     words = str(family.summary) if family is not None else cause.effect.replace("_", " ")
     return f"{words} ({cause.place})" if cause.place else words
 
@@ -115,7 +118,7 @@ def _short(diagnosis: Diagnosis, cause: NamedCause) -> str:
 
 
 def _words(diagnosis: Diagnosis, effect: str) -> str:
-    family = diagnosis.twin.searching(wide=True).families().get(effect)
+    family = diagnosis.twin.families().get(effect)
     return str(family.summary).split(":", maxsplit=1)[0] if family is not None else effect.replace("_", " ")
 
 
@@ -139,7 +142,7 @@ def story(diagnosis: Diagnosis) -> str:
         )
     if diagnosis.verdict == "nothing_found":
         return text + "No cause in the library, and no pattern of any other kind, predicts the data better than chance."
-    parts = [_put_in(diagnosis), _on_unseen_data(diagnosis), _of_absolute_time(diagnosis), _in_library(diagnosis)]
+    parts = [_put_in(diagnosis), _on_unseen_data(diagnosis), _in_library(diagnosis)]
     if diagnosis.unexplained.significant and not diagnosis.interrupted:
         size = "" if diagnosis.verdict == "unknown" else f" ({diagnosis.residual.left_in_words})"
         parts.append(f"Left unexplained{size}: {diagnosis.unexplained.signature}. ")
@@ -158,8 +161,6 @@ def _put_in(diagnosis: Diagnosis) -> str:
         what = "either of these" if diagnosis.verdict == "ambiguous" else what
         text += f"With {what} put into the simulation it misses by {three_digits(after)} m/s²"
         text += ", which is noise. " if after < 1.05 * diagnosis.residual.noise_floor else ". "
-    if diagnosis.unexplained.extends_twin:
-        text += f"With a description that has no name in the simulation it misses by {three_digits(after)} m/s². "
     return text
 
 
@@ -172,8 +173,9 @@ def _on_unseen_data(diagnosis: Diagnosis) -> str:
         f"On validation data ({gain.held_out}), {percent(gain.share_of_excess_removed)} of the error "
         "beyond noise is gone. "
     )
-    if diagnosis.unexplained.left_out and math.isfinite(gain.share_in_any_recording):
-        text += f"In any other recording it would be {percent(max(gain.share_in_any_recording, 0.0))}. "
+    anywhere = gain.share_in_any_recording
+    if math.isfinite(anywhere) and abs(anywhere - gain.share_of_excess_removed) > SAME_SHARE:
+        text += f"In any other recording it would be {percent(max(anywhere, 0.0))}. "
     return text
 
 
@@ -188,18 +190,6 @@ def _in_library(diagnosis: Diagnosis) -> str:
     )
 
 
-def _of_absolute_time(diagnosis: Diagnosis) -> str:
-    """Return which terms are not in the extended twin, as they belong to one recording."""
-    left_out = diagnosis.unexplained.left_out
-    if not left_out:
-        return ""
-    what = f"{_count(left_out)} terms" if left_out > 1 else "one term"
-    return (
-        f"Of what describes it {what} of absolute time {'are' if left_out > 1 else 'is'} not in twin.toml: another "
-        "recording has other phases, and no second one confirms them. "
-    )
-
-
 def _silent(diagnosis: Diagnosis, run: RunView) -> list[str]:
     """Return the channels of a run without a single usable sample."""
     alive = np.asarray(run.valid.any(axis=0))
@@ -208,7 +198,7 @@ def _silent(diagnosis: Diagnosis, run: RunView) -> list[str]:
 
 def parameter_units(diagnosis: Diagnosis, cause: NamedCause) -> Mapping[str, str]:
     """Return the units that the effect of a cause declares for its parameters, by key."""
-    family = diagnosis.twin.searching(wide=True).families().get(cause.effect)
+    family = diagnosis.twin.families().get(cause.effect)
     return {} if family is None else family.parameter_units(diagnosis.twin.array)
 
 
@@ -301,14 +291,11 @@ def _by_verdict(diagnosis: Diagnosis) -> list[str]:
         case "unknown" if diagnosis.interrupted:
             return ["Run it again with more time (--time-limit), or on a part of the recording."]
         case "unknown":
-            located = "; ".join(one.text for one in diagnosis.unexplained.located)
-            place = "" if diagnosis.rigid is None else diagnosis.rigid.sentence
-            place = f"Look where it was located: {located}." if located else place
+            located = "; ".join(one.unlisted.text for one in diagnosis.causes if one.unlisted is not None)
+            place = f"Look where it was located: {located}." if located else ""
             steps = [place or "Look at the residual views of the report for where the discrepancy sits."]
             if diagnosis.unexplained.mistake:
                 steps = [f"Check the files: {diagnosis.unexplained.mistake}."]
-            if diagnosis.unexplained.extends_twin:
-                steps.append("Until it has a name, simulate with twin.toml: its terms called unknown describe it.")
             return [*steps, "Record another run with another motion: what stays is in the rig or the sensors."]
         case _:
             more = "no more than what is left unexplained" if diagnosis.unexplained.significant else "nothing"

@@ -18,6 +18,7 @@ from gfimu.diagnosis.search.screening import Screening, screen
 from gfimu.diagnosis.search.sets import Key, Sets, has_stalled, prune
 from gfimu.diagnosis.terms.cause import Cause, effects_of
 from gfimu.diagnosis.terms.drive import Drive
+from gfimu.diagnosis.terms.located.term import is_located
 from gfimu.diagnosis.time_limit import what_ended
 from gfimu.model.world_model import memory_of
 
@@ -306,7 +307,8 @@ def reduced(explanation: Explanation, name: str, policy: Policy) -> Explanation:
         if name not in one.names:
             sets.found[one.key] = one
     sets.found = {key: one for key, one in sets.found.items() if one.key <= explanation.best.key}
-    return replace(explained(sets, prune(sets), explanation.fits), elsewhere=explanation.elsewhere)
+    about = explanation.screening if any(map(is_located, explanation.best.causes)) else None
+    return replace(explained(sets, prune(sets), explanation.fits, about), elsewhere=explanation.elsewhere)
 
 
 def exactly(explanation: Explanation, policy: Policy) -> Explanation:

@@ -19,8 +19,8 @@ from gfimu.diagnosis.fit.linear import Point, linearise
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.terms.cause import effects_of
 from gfimu.diagnosis.terms.located.alternatives import channel_patterns, chip_groups
-from gfimu.diagnosis.terms.located.operators import Place, channel_place, rig_places
 from gfimu.diagnosis.terms.located.policy import LOCATED
+from gfimu.model.located.operators import Place, channel_place, rig_places
 from gfimu.model.world_model import reads_place
 
 __all__ = ["FreeTime", "free_time"]
@@ -75,8 +75,8 @@ def _directions(stretch: Stretch, point: Point, index: int) -> Iterator[tuple[Pl
     """Yield places with how an error of each component shows, (n, c + 1)."""
     array = stretch.model.array
     state = stretch.state(effects_of(point.causes, array, stretch.index), point.drives[index].spin)
-    places = rig_places(is_angle=reads_place(stretch.model))
-    for what in ("reads", "turns", "vibrates", "shakes", "gain"):
+    places = rig_places(is_angle=reads_place(stretch.model), has_geometry=state.placed is not None)
+    for what in sorted({"reads", "turns", "vibrates", "shakes", "heaves", "gain"} & places.keys()):
         parts = [next(p for p in reversed(one.parts) if p is not None) for one in places[what].operators(state)]
         yield places[what], "all", parts
     kinds = [("offset", pattern) for pattern in channel_patterns(array)]

@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.diagnosis.data.stretch import Stretch
-from gfimu.diagnosis.fit.evidence import SCALES, inverse, log_evidence
+from gfimu.diagnosis.fit.coarse import WHOLE, coarse
+from gfimu.diagnosis.fit.evidence import inverse, log_evidence
+from gfimu.diagnosis.fit.gauss_newton import precision
 from gfimu.diagnosis.fit.linear import Point, linearise
+from gfimu.diagnosis.search.sets import Key
 from gfimu.diagnosis.search.waves import wave_terms
 from gfimu.diagnosis.terms.cause import Cause, effects_of
 from gfimu.diagnosis.terms.columns import Columns
 from gfimu.diagnosis.terms.library import cause_columns
 from gfimu.diagnosis.terms.located.alternatives import ChannelTerms, channel_terms, dependences, rig_terms
-from gfimu.diagnosis.terms.located.operators import channel_place
 from gfimu.diagnosis.terms.located.policy import LOCATED
 from gfimu.diagnosis.terms.located.term import LocatedTerm, located_columns
+from gfimu.model.located.operators import channel_place
 from gfimu.model.world_model import reads_place
 
 __all__ = ["Leader", "LocatedScreen"]
@@ -46,87 +49,155 @@ class Leader:
 
 
 class LocatedScreen:
-    """Normal equations of located terms at a point, drives, slow noise and the causes there integrated out."""
+    """Normal equations of located terms at a point, drives, slow noise and the causes there integrated out.
+
+    One screening serves the point and what it would be without some of its causes, in the linear world about it.
+    """
 
     def __init__(self, stretches: Sequence[Stretch], point: Point) -> None:
         self._stretches, self._array = stretches, stretches[0].model.array
-        self._posteriors = linearise(stretches, point, responses=False).posteriors
+        self._posteriors = linearise(stretches, replace(point, residue=None), responses=False).posteriors
         self._states = [
             stretch.state(effects_of(point.causes, self._array, stretch.index), drive.spin)
             for stretch, drive in zip(stretches, point.drives, strict=True)
         ]
+        residues = point.residue.columns if point.residue is not None else (None,) * len(stretches)
         self._present = [
-            cause_columns(stretch, at.observed, at.drive, point.causes)
-            for stretch, at in zip(stretches, self._posteriors, strict=True)
+            Columns.together(
+                [*([] if own is None else [own]), cause_columns(stretch, at.observed, at.drive, point.causes)]
+            )
+            for stretch, at, own in zip(stretches, self._posteriors, residues, strict=True)
         ]
+        first = 0 if residues[0] is None else residues[0].count
+        self._precision = np.concatenate([np.ones(first), precision(point.causes)])
+        ends = first + np.cumsum([0, *(cause.unknowns for cause in point.causes)])
+        self._unknowns = {
+            cause.key: np.arange(start, stop) for cause, start, stop in zip(point.causes, ends, ends[1:], strict=False)
+        }
+        most = max(int(1.0 / (LOCATED.averaged_hz * stretches[0].run.sample_period)), 1)
+        self._coarse = [coarse(posterior, most) for posterior in self._posteriors]
+        self._sizes = np.zeros(len(self._precision))
+        for cause in point.causes:
+            self._sizes[self._unknowns[cause.key][: len(cause.coordinates)]] = cause.coordinates
 
-    def leaders(self) -> list[Leader]:
-        """Return all terms, most probable first."""
+    def leaders(self, without: Key = frozenset(), least: float = -np.inf) -> list[Leader]:
+        """Return all terms from some log odds on, most probable first.
+
+        Parameters
+        ----------
+        without : frozenset of (str, str)
+            Effects and places of causes of the point that are left out.
+        least : float
+            Log odds, nats, of terms that are of interest.
+        """
+        return self.leaders_each([(without, least)])[0]
+
+    def leaders_each(self, cases: Sequence[tuple[Key, float]]) -> list[list[Leader]]:
+        """Return the same for several cases, each the causes that are left out and the least log odds."""
         is_angle = reads_place(self._stretches[0].model)
         every = dependences(self._states)
         waves, of_channels = wave_terms(self._states, self._posteriors, self._array, is_angle=is_angle)
-        terms = [*rig_terms(self._states, every, is_angle=is_angle), *waves]
-        found = [self._judged(term, *self._products(term)) for term in terms if term.count <= LOCATED.widest]
-        for some in (*channel_terms(self._states, every, self._array), *of_channels):
-            found += self._of_channels(some)
-        seen = [leader for leader in found if leader is not None and np.isfinite(leader.log_odds)]
-        seen.sort(key=lambda leader: -leader.log_odds)
-        shaped = [leader for leader in seen[: LOCATED.refined] if leader.term.dependence.near(1.0)]
-        return sorted([*map(self._refined, shaped), *seen], key=lambda leader: -leader.log_odds)
+        found: list[list[Leader]] = [[] for _ in cases]
+        for term, gram, score in self._each((*rig_terms(self._states, every, is_angle=is_angle), *waves)):
+            for (without, least), leaders in zip(cases, found, strict=True):
+                leaders.extend(self._judged(term, *self._beside(gram, score, without), least))
+        channels = {
+            self._on_each_channel(some): some
+            for some in (*channel_terms(self._states, every, self._array), *of_channels)
+        }
+        for whole, gram, score in self._each(channels):
+            for (without, least), leaders in zip(cases, found, strict=True):
+                inner, right = self._beside(gram, score, without)
+                for term, mixing in self._patterns(channels[whole]):
+                    leaders.extend(self._judged(term, mixing.T @ inner @ mixing, mixing.T @ right, least))
+        return [sorted(leaders, key=lambda leader: -leader.log_odds) for leaders in found]
 
-    def _refined(self, leader: Leader) -> Leader:
+    def refined(self, leader: Leader, without: Key = frozenset()) -> Leader:
         """Return a leader at the most probable frequency, damping or order nearby."""
         for width in LOCATED.widths:
-            for dependence in leader.term.dependence.near(width):
-                term = replace(leader.term, dependence=dependence)
-                other = self._judged(term, *self._products(term))
-                if other is not None and other.log_odds > leader.log_odds:
-                    leader = other
+            others = [replace(leader.term, dependence=dependence) for dependence in leader.term.dependence.near(width)]
+            for term, gram, score in self._each(others):
+                for other in self._judged(term, *self._beside(gram, score, without), leader.log_odds):
+                    leader = max(leader, other, key=lambda one: one.log_odds)
         return leader
 
-    def _products(self, term: LocatedTerm) -> tuple[_Floats, _Floats]:
-        """Return G (P, P) and b (P,) of a term's coefficients."""
-        held = self._present[0].count
-        gram, score = np.zeros((held + term.count,) * 2), np.zeros(held + term.count)
-        for state, present, posterior in zip(self._states, self._present, self._posteriors, strict=True):
-            columns = located_columns(term, state, posterior.observed.weight)
-            own, right, _ = posterior.products(Columns.together([present, columns]))
+    def _each(self, terms: Iterable[LocatedTerm]) -> Iterator[tuple[LocatedTerm, _Floats, _Floats]]:
+        """Yield terms that are not too wide with the products of the causes' unknowns and their coefficients."""
+        slow: list[LocatedTerm] = []
+        fast: list[LocatedTerm] = []
+        for term in terms:
+            if term.count <= LOCATED.widest:
+                some = slow if term.dependence.is_slow else fast
+                if some and sum(one.count for one in some) + term.count > LOCATED.together:
+                    yield from self._products(some)
+                    some.clear()
+                some.append(term)
+        for some in (slow, fast):
+            if some:
+                yield from self._products(some)
+
+    def _products(self, terms: Sequence[LocatedTerm]) -> Iterator[tuple[LocatedTerm, _Floats, _Floats]]:
+        """Yield terms with G (P, P) and b (P,) of the causes' unknowns and their coefficients, relative to no sizes."""
+        held = len(self._sizes)
+        count = held + sum(term.count for term in terms)
+        gram, score = np.zeros((count, count)), np.zeros(count)
+        for index, (state, present, whole) in enumerate(
+            zip(self._states, self._present, self._posteriors, strict=True)
+        ):
+            columns = Columns.together(
+                [present, *(located_columns(term, state, whole.observed.weight) for term in terms)]
+            )
+            posterior, rows = self._coarse[index] if terms[0].dependence.is_slow else (whole, WHOLE)
+            own, right, _ = posterior.products(rows.of_columns(columns))
             gram, score = gram + own, score + right
-        if not held:
-            return gram, score
-        gain = inverse(gram[:held, :held] + np.eye(held) / SCALES[-1] ** 2) @ gram[:held, held:]
-        return gram[held:, held:] - gram[held:, :held] @ gain, score[held:] - gain.T @ score[:held]
+        score += gram[:, :held] @ self._sizes
+        start = held
+        for term in terms:
+            mine = np.append(np.arange(held), np.arange(start, start + term.count))
+            start += term.count
+            yield term, gram[np.ix_(mine, mine)], score[mine]
 
-    def _of_channels(self, some: ChannelTerms) -> Iterator[Leader | None]:
-        """Judge all patterns of an error of channels by the products of every channel by itself."""
+    def _beside(self, gram: _Floats, score: _Floats, without: Key) -> tuple[_Floats, _Floats]:
+        """Return G and b of a term's coefficients, the causes but those left out integrated out."""
+        count = len(self._sizes)
+        kept = np.ones(count, dtype=bool)
+        for key in without:
+            kept[self._unknowns[key]] = False
+        held = np.flatnonzero(kept)
+        mine, right = gram[count:, count:], score[count:]
+        if not len(held):
+            return mine, right
+        across = gram[held, count:]
+        gain = inverse(gram[np.ix_(held, held)] + np.diag(self._precision[held])) @ across
+        return mine - across.T @ gain, right - gain.T @ score[held]
+
+    def _on_each_channel(self, some: ChannelTerms) -> LocatedTerm:
+        """Return an error of every channel by itself, from whose products those of all patterns follow."""
         single = tuple((channel,) for channel in range(self._array.n_channels))
-        every = LocatedTerm(channel_place("channel", some.kind, single, self._array.channels), some.dependence)
-        gram, score = self._products(every)
-        count = some.dependence.count
-        for term, groups in some.terms():
-            if term.count > LOCATED.widest:
-                continue
-            mixing = np.zeros((len(single), len(groups)))
-            for component, group in enumerate(groups):
-                mixing[list(group), component] = 1.0
-            whole = np.kron(mixing, np.eye(count))
-            yield self._judged(term, whole.T @ gram @ whole, whole.T @ score)
+        return LocatedTerm(channel_place("channel", some.kind, single, self._array.channels), some.dependence)
 
-    def _judged(self, term: LocatedTerm, gram: _Floats, score: _Floats) -> Leader | None:
-        """Return a term at its most probable length scale; None where it is not seen."""
+    def _patterns(self, some: ChannelTerms) -> Iterator[tuple[LocatedTerm, _Floats]]:
+        """Yield the terms of an error of channels with how their coefficients mix those of single channels."""
+        for term, groups in some.terms():
+            if term.count <= LOCATED.widest:
+                mixing = np.zeros((self._array.n_channels, len(groups)))
+                for component, group in enumerate(groups):
+                    mixing[list(group), component] = 1.0
+                yield term, np.asarray(np.kron(mixing, np.eye(some.dependence.count)))
+
+    def _judged(self, term: LocatedTerm, gram: _Floats, score: _Floats, least: float) -> list[Leader]:
+        """Return a term at its most probable length scale; none where it is not seen or of no interest."""
         if not np.trace(gram) > LOCATED.least_information:
-            return None
+            return []
         prior = self._log_prior(term)
         best: tuple[float, int, _Floats] | None = None
         for length in range(len(term.dependence.roots)):
             mixing = term.mixing(length)
             inner, right = mixing.T @ gram @ mixing, mixing.T @ score
-            value = log_evidence(0.5 * (inner + inner.T), right)
-            if best is None or value > best[0]:
+            value = log_evidence(0.5 * (inner + inner.T), right) + prior
+            if np.isfinite(value) and value >= least and (best is None or value > best[0]):
                 best = value, length, np.asarray(np.linalg.solve(inner + np.eye(len(right)), right))
-        assert best is not None
-        value, length, coordinates = best
-        return Leader(value + prior, term, term.cause(length, coordinates, prior))
+        return [] if best is None else [Leader(best[0], term, term.cause(best[1], best[2], prior))]
 
     def _log_prior(self, term: LocatedTerm) -> float:
         alike = {"one": self._array.n_channels, "chip": len(self._array.chips)}.get(term.pattern, 1)

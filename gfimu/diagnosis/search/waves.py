@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.array.array import AccelerometerArray
-from gfimu.diagnosis.data.table.rig_state import RigState
 from gfimu.diagnosis.terms.located.alternatives import ChannelTerms, channel_patterns
-from gfimu.diagnosis.terms.located.dependences import Wave
-from gfimu.diagnosis.terms.located.operators import Operator, rig_places
 from gfimu.diagnosis.terms.located.policy import LOCATED
 from gfimu.diagnosis.terms.located.term import LocatedTerm
+from gfimu.model.located.dependences import Wave
+from gfimu.model.located.operators import Operator, rig_places
+from gfimu.model.located.rig_state import RigState
 
 __all__ = ["signal_of", "wave_terms"]
 
@@ -48,8 +48,8 @@ def wave_terms(
     state, posterior = states[longest], posteriors[longest]
     whitened, weights = posterior.whitened, posterior.observed.weights
     fastest = max(float(np.abs(one.spin.rate).max()) for one in states)
-    places, terms = rig_places(is_angle=is_angle), list[LocatedTerm]()
-    for what in ("reads", "turns", "vibrates", "shakes", "gain"):
+    places, terms = rig_places(is_angle=is_angle, has_geometry=state.placed is not None), list[LocatedTerm]()
+    for what in sorted({"reads", "turns", "vibrates", "shakes", "heaves", "gain"} & places.keys()):
         signal = np.column_stack([signal_of(one, whitened, weights) for one in places[what].operators(state)])
         of_time = what != "turns"  # the drive follows a tone, as far as its knots do
         terms += [LocatedTerm(places[what], wave) for wave in _waves(signal, state, fastest, of_time=of_time)]

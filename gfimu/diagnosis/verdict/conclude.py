@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import expit
 
-from gfimu.array.array import AccelerometerArray
 from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.criticism.lack_of_fit import LackOfFit
 from gfimu.diagnosis.criticism.slow_noise import LoudestChannel, loudest_channel, white_factor
@@ -27,6 +26,8 @@ from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.explain import Explanation
 from gfimu.diagnosis.search.nuisance_models import Understanding
 from gfimu.diagnosis.terms.cause import Cause, effects_of
+from gfimu.diagnosis.terms.located.term import is_located
+from gfimu.diagnosis.verdict.located import located_cause, of_free_time
 from gfimu.diagnosis.verdict.naming import (
     capped,
     channel_share,
@@ -43,32 +44,10 @@ from gfimu.diagnosis.verdict.verdict import Diagnosis
 from gfimu.diagnosis.verdict.wording import Notes, verdict_sentences
 from gfimu.model.world_model import Effect, WorldModel, is_of_one_recording
 
-__all__ = ["Described", "conclude", "is_dominant", "is_unknown", "named_causes"]
+__all__ = ["conclude", "is_dominant", "is_unknown", "named_causes"]
 
 _OF_NOISE = frozenset({"noise", "bias_random_walk"})
 _TURNS = ("direction_rad", "phase_rad")  # compared on the circle: a relative error means nothing
-
-
-@dataclass(frozen=True)
-class Described:
-    """A description of what has no name.
-
-    Parameters
-    ----------
-    whole : Fit
-        All its terms.
-    carried : Fit, optional
-        Those that go into the extended twin: functions of the motion and the angle, and of absolute time where another
-        recording confirms them; None where none is left.
-    """
-
-    whole: Fit
-    carried: Fit | None
-
-    @property
-    def left_out(self) -> int:
-        """How many terms do not go into the extended twin."""
-        return len(self.whole.causes) - (0 if self.carried is None else len(self.carried.causes))
 
 
 def removed(explanation: Explanation) -> float:
@@ -83,7 +62,7 @@ def stands_out(explanation: Explanation, left: LackOfFit, policy: Policy) -> boo
 
 def _depends(explanation: Explanation, left: LackOfFit, policy: Policy) -> bool:
     """Return the same of all but noise that grows with the motion, which speaks against no cause."""
-    if left.instead or _is_full(explanation, policy):
+    if _is_full(explanation, policy):
         return left.log_odds > policy.lack_odds
     return left.log_odds > max(policy.lack_odds, policy.inexactness * removed(explanation))
 
@@ -92,7 +71,8 @@ def is_dominant(explanation: Explanation, left: LackOfFit, policy: Policy) -> bo
     """Whether the lack of fit weighs too much against what the causes explain for these to be believed."""
     if not explanation.best.causes:
         return stands_out(explanation, left, policy)
-    large = left.instead or 2.0 * left.log_odds > policy.dominant * removed(explanation)
+    share = policy.least_share if left.free else policy.dominant
+    large = 2.0 * left.log_odds > share * removed(explanation)
     return large and _depends(explanation, left, policy)
 
 
@@ -131,10 +111,14 @@ def named_causes(explanation: Explanation, fit: Fit, policy: Policy, left: LackO
         others = [other for other in fit.causes if other is not cause]
         change = (whole - stretch.predict(effects_of(others, array, stretch.index), spin)) * stretch.mask
         share = channel_share(_seen(stretch, change[:, :-1]), array.channels)
-        entry = name_cause(explanation, fit, cause, likely, array, share, policy)
-        why = entry.why + _other_runs(cause, stretch, runs)
-        entry = replace(entry, why=why, std=_widened(explanation, fit, entry, cause, policy, left))
-        entries.append((float(sum(value**2 for value in share.values())), capped(entry, policy, cause.shape)))
+        if is_located(cause):
+            entry = located_cause(explanation, fit, cause, policy)
+        else:
+            entry = name_cause(explanation, fit, cause, likely, array, share, policy)
+            why = entry.why + _other_runs(cause, stretch, runs)
+            entry = replace(entry, why=why, std=_widened(explanation, fit, entry, cause, policy, left))
+            entry = capped(entry, policy, cause.shape)
+        entries.append((float(sum(value**2 for value in share.values())), entry))
     return [entry for _, entry in sorted(entries, key=lambda pair: -pair[0])]
 
 
@@ -191,7 +175,6 @@ def conclude(
     policy: Policy,
     *,
     withdrawn: Sequence[str] = (),
-    described: Described | None = None,
     refuted: str = "",
     unknown: bool = False,
 ) -> Diagnosis:
@@ -211,8 +194,6 @@ def conclude(
         Thresholds.
     withdrawn : sequence of str
         Causes that held-out data withdrew.
-    described : Described, optional
-        A description of what has no name.
     refuted : str
         Why the causes must not stand, where the gate withdrew them.
     unknown : bool
@@ -228,15 +209,18 @@ def conclude(
     ]
     rivals = conflicting(explanation, policy)
     named = named_causes(explanation, explanation.best, policy, left)
-    believed = _believed(explanation, described, unknown=unknown)
+    believed = explanation.nothing if refuted or (unknown and left.free) else explanation.best
     loudest = loudest_channel(explanation.stretches, believed.point, policy)
     apart = stands_out(explanation, left, policy)
     runs = run_views(prepared, explanation.stretches, believed)
     levels = believed.point.levels[0]
     floor = body_noise_floor(first, levels) if isinstance(first, BodyStretch) else _noise_floor(runs, first, believed)
     residual = Residual.of_views(runs, array.channels, floor)
+    without_name = [cause for cause in named if cause.unlisted is not None]
     if unknown or (not named and loudest.stands_out(policy)):
-        verdict, causes = "unknown", tuple(one for one in found if one.effect not in _OF_NOISE)
+        verdict = "unknown"
+        places = [of_free_time(left.free, policy)] if left.free else without_name
+        causes = (*(one for one in found if one.effect not in _OF_NOISE), *places)
     elif rivals:
         verdict = "ambiguous"
         others = {c.effect: c for rival in reversed(rivals) for c in named_causes(explanation, rival, policy)}
@@ -244,19 +228,18 @@ def conclude(
         verdict_causes = contested(every, [explanation.best, *rivals], model.families())
         causes = _by_contribution(found, verdict_causes, residual, levels)
     elif named or found:
-        verdict, causes = "explained", _by_contribution(found, named, residual, levels)
+        verdict = "unknown" if named and named[0].unlisted is not None else "explained"
+        causes = _by_contribution(found, named, residual, levels)
     else:
         verdict, causes = "nothing_found", ()
     shown = left.signature if (unknown and not refuted) or apart else ""
+    words_of = "; ".join(cause.why for cause in without_name) if verdict == "unknown" and not refuted else ""
     unexplained = Unexplained(
-        unknown or apart or loudest.stands_out(policy),
-        "; ".join(part for part in (refuted, shown, _loud(loudest, policy)) if part),
+        unknown or apart or loudest.stands_out(policy) or bool(without_name),
+        "; ".join(dict.fromkeys(part for part in (refuted, words_of, shown, _loud(loudest, policy)) if part)),
         max(left.log_odds, left.noise_odds),
-        left.surrogate if described is None else _coefficients(described.whole.causes, first),
-        described is not None and described.carried is not None,
-        0 if described is None else described.left_out,
     )
-    extension, of_time = _extension(believed, described, array, unknown=unknown, confirmed=gain.of_other_recording)
+    extension, of_time = _extension(explanation, believed, policy, confirmed=gain.of_other_recording)
     twin = model.extended([*_library_effects(model, found), *_residue(explanation), *extension])
     expected = model.expected_noise(first.run.output_data_rate)
     body = first.run if isinstance(first, BodyStretch) else None
@@ -273,7 +256,6 @@ def conclude(
     notes = Notes(
         residue=understanding.residue,
         unreferenced=sum(run.unreferenced for run in prepared.runs),
-        terms=len(extension) if unknown else 0,
         loudest=(loudest.name, loudest.level, loudest.ratio),
         rest=left.signature if left.log_odds > policy.lack_odds else "",
     )
@@ -315,22 +297,24 @@ def _by_contribution(
     return (*(fault for fault in faults if fault not in small), *inferred, *small)
 
 
-def _believed(explanation: Explanation, described: Described | None, *, unknown: bool) -> Fit:
-    """Return the fit that the extended twin and the pictures show."""
-    if not unknown:
-        return explanation.best
-    return described.carried if described is not None and described.carried is not None else explanation.nothing
-
-
 def _extension(
-    believed: Fit, described: Described | None, array: AccelerometerArray, *, unknown: bool, confirmed: bool
+    explanation: Explanation, believed: Fit, policy: Policy, *, confirmed: bool
 ) -> tuple[list[Effect], list[str]]:
     """Return what extends the twin, and the names of causes of absolute time that do not, as nothing confirms them."""
-    if unknown:
-        carried = described is not None and described.carried is not None
-        return (effects_of(believed.causes, array, 0) if carried else []), []
+    model = explanation.stretches[0].model
     of_time = [cause for cause in believed.causes if is_of_one_recording(cause.family) and not confirmed]
-    return effects_of([one for one in believed.causes if one not in of_time], array, 0), [one.name for one in of_time]
+    effects = []
+    for cause in believed.causes:
+        if cause in of_time:
+            continue
+        effect = cause.effect(model.array, 0)
+        if is_located(cause):
+            found = located_cause(explanation, believed, cause, policy).unlisted
+            assert found is not None
+            table = {} if found.function is None else {"function": found.function.to_dict()}
+            effect = model.described({**effect.parameters, "text": found.text, **table})
+        effects.append(effect)
+    return effects, [cause.name for cause in of_time]
 
 
 def _of_absolute_time(names: Sequence[str]) -> str:
@@ -385,17 +369,6 @@ def _residue(explanation: Explanation) -> tuple[Effect, ...]:
     if point.residue is None:
         return ()
     return point.residue.effects(explanation.stretches[0], linearise(explanation.stretches, point).residue)
-
-
-def _coefficients(terms: Sequence[Cause], stretch: Stretch) -> dict[str, float]:
-    """Return the coefficients of a description's terms by what they are of, with its unit, and by function."""
-    array = stretch.model.array
-    return {
-        f"{size.key}: {cause.effect(array, 0).parameters['dependence']}": float(value)
-        for cause in terms
-        for size, value in zip(cause.family.sizes(array), cause.sizes(array, 0), strict=True)
-        if value
-    }
 
 
 def _noise_floor(runs: Sequence[RunView], stretch: Stretch, believed: Fit) -> float:

@@ -23,7 +23,6 @@ __all__ = [
     "library_probability",
     "standing_out",
     "with_library",
-    "with_wider_library",
 ]
 
 
@@ -33,9 +32,6 @@ class LibraryEvidence:
 
     Parameters
     ----------
-    coincidence : float
-        Log odds of the likeliest pattern among the free numbers of the causes against none, nats; 0 where none is
-        likelier than chance.
     unexplained : float
         Log odds of the strongest lack of fit beside the causes, nats, at least ``Policy.lack_odds`` where the slow
         noise of a channel stands out; 0 where chance is likelier.
@@ -43,7 +39,6 @@ class LibraryEvidence:
         Whether another recording, as validation data, was predicted.
     """
 
-    coincidence: float = 0.0
     unexplained: float = 0.0
     confirmed: bool = False
 
@@ -52,27 +47,25 @@ class LibraryEvidence:
 class LibraryRule:
     """Logistic rule for the probability that a cause is true, its coefficients fitted to worlds inside and outside.
 
-    The log odds are ``constant + coincidence · c + size · ln z + unexplained · ln(1 + l)`` with the evidence c and l of
+    The log odds are ``constant + size · ln z + unexplained · ln(1 + l)`` with the evidence l of
     `LibraryEvidence`, nats, and z the largest size of the cause over its standard deviation.
 
     Parameters
     ----------
-    constant, coincidence, size, unexplained : float
+    constant, size, unexplained : float
         Coefficients. Set on 142 causes that were named in worlds inside the library (the gate of `sim.trials.study`,
         with one effect taken out of it in some) and in foreign ones (``tests/foreign_study.py``); 11 of these names
         were wrong.
     most : float
         Largest probability without another recording.
-    nats, stds : tuple of (float, float)
-        Where c and z are clipped: what is beyond says no more.
+    stds : tuple of (float, float)
+        Where z is clipped: what is beyond says no more.
     """
 
     constant: float = 1.19
-    coincidence: float = -0.82
     size: float = 0.67
     unexplained: float = -0.83
     most: float = 0.97
-    nats: tuple[float, float] = (0.0, 20.0)
     stds: tuple[float, float] = (0.3, 100.0)
 
 
@@ -105,7 +98,6 @@ def library_probability(evidence: LibraryEvidence, stds: float, rule: LibraryRul
     """
     odds = (
         rule.constant
-        + rule.coincidence * float(np.clip(evidence.coincidence, *rule.nats))
         + rule.size * float(np.log(np.clip(stds, *rule.stds)))
         + rule.unexplained * float(np.log1p(max(evidence.unexplained, 0.0)))
     )
@@ -146,12 +138,6 @@ def with_library(
     least = min(likely.values())
     words = (*found.sentences, f"{_sentence(least, evidence)}.")
     return replace(found, causes=causes, library_probability=least, sentences=words)
-
-
-def with_wider_library(found: Diagnosis) -> Diagnosis:
-    """Return a verdict by the wider library, which explains the data better; its twin has the usual one."""
-    words = (*found.sentences, "The usual effects explain the data less well: further ones were searched, too.")
-    return replace(found, twin=found.twin.searching(wide=False), sentences=words)
 
 
 def _sentence(least: float, evidence: LibraryEvidence) -> str:

@@ -8,7 +8,7 @@ a rig: it is tried where the sizes found are impossible, or where nothing in the
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +18,18 @@ from gfimu.array.array import AccelerometerArray
 from gfimu.base.files.model_files import list_models
 from gfimu.diagnosis.data.plausibility import NOISE, REMOVED
 from gfimu.diagnosis.data.run import Run
-from gfimu.model.world_model import WorldModel
+from gfimu.diagnosis.data.stretch import Stretch
+from gfimu.diagnosis.fit.learn import predicted_by_reference
+from gfimu.diagnosis.verdict.gate import NOT_THIS_UNIT
+from gfimu.diagnosis.verdict.verdict import Diagnosis
+from gfimu.model.world_model import WorldModel, is_linear
 
-__all__ = ["LikelyMistake", "likely_mistake"]
+__all__ = ["LikelyMistake", "likely_mistake", "with_mistake"]
+
+_NO_MISTAKE = (
+    "Other orders and signs of the channels, millimetres, centimetres or inches for metres, and other arrays of the "
+    "library were tried: none of them fits."
+)
 
 _LENGTHS = {"mm": 1e3, "cm": 1e2, "inches": 1.0 / 0.0254}
 """Numerical: units for which a length of the array file may have been taken, and how many there are in a metre."""
@@ -80,6 +89,31 @@ def likely_mistake(model: WorldModel, runs: Sequence[Run], predict: Predict) -> 
     # Another order of the channels does as well as some other arrays: the plainest comes first.
     text, after = next(option for option in options if option[1].squares <= least + NOISE)
     return LikelyMistake(text, before.rms, after.rms)
+
+
+def with_mistake(found: Diagnosis, stretches: Sequence[Stretch], runs: Sequence[Run]) -> Diagnosis:
+    """Return a verdict with a mistake in the files that explains what nothing in the library does.
+
+    Parameters
+    ----------
+    found : Diagnosis
+        The verdict.
+    stretches : sequence of Stretch
+        The data with the simulation as it was given.
+    runs : sequence of Run
+        The recordings.
+    """
+    model = stretches[0].model
+    if found.verdict != "unknown" or is_linear(model) or model.drive_source == "gyro":
+        return found
+    mistake, more = likely_mistake(model, runs, predicted_by_reference), ""
+    if mistake is not None:
+        found = replace(found, unexplained=replace(found.unexplained, mistake=mistake.text))
+        more = mistake.sentence
+    elif found.unexplained.signature.startswith(NOT_THIS_UNIT):
+        more = _NO_MISTAKE
+    first, *others = found.sentences
+    return replace(found, sentences=(first, more, *others)) if more else found
 
 
 @dataclass(frozen=True)

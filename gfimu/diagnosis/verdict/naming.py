@@ -16,8 +16,9 @@ from gfimu.diagnosis.fit.gauss_newton import Fit
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.explain import Explanation
 from gfimu.diagnosis.terms.cause import Cause
-from gfimu.diagnosis.verdict.parts import NamedCause, Rival, Unlisted
-from gfimu.model.world_model import Effect, EffectFamily, dependence_of
+from gfimu.diagnosis.terms.located.term import is_located
+from gfimu.diagnosis.verdict.parts import NamedCause, Rival
+from gfimu.model.world_model import Effect, EffectFamily
 
 __all__ = [
     "capped",
@@ -31,6 +32,9 @@ __all__ = [
     "probabilities",
     "rival_list",
 ]
+
+
+_ANOTHER_RUN = "another run with another motion"
 
 
 def probabilities(explanation: Explanation, policy: Policy) -> dict[str, float]:
@@ -100,16 +104,21 @@ def mimics(explanation: Explanation, cause: Cause, policy: Policy) -> list[str]:
 
 
 def conflicting(explanation: Explanation, policy: Policy) -> list[Fit]:
-    """Return rival sets that the data can't separate from the best one."""
+    """Return rival sets with other named causes that the data can't separate from the best one."""
     best = explanation.best
+    named = _named(best)
     return [
         rival
         for rival in explanation.rivals
         if best.causes
-        and rival.names != best.names
+        and _named(rival) != named
         and len(rival.causes) <= len(best.causes)
         and rival.log_posterior > best.log_posterior - policy.ambiguous
     ]
+
+
+def _named(fit: Fit) -> frozenset[str]:
+    return frozenset(cause.name for cause in fit.causes if not is_located(cause))
 
 
 def rival_list(explanation: Explanation, policy: Policy) -> tuple[Rival, ...]:
@@ -174,11 +183,7 @@ def name_cause(
     parameters, std = cause_parameters(cause, array)
     same = mimics(explanation, cause, policy) if fit is explanation.best else []
     without = explanation.without.get(cause.name)
-    why = (
-        _sentence(cause, array, share)
-        + _at_most(explanation, fit, cause)
-        + _or_other_nuisances(explanation, cause, policy)
-    )
+    why = _sentence(cause, array, share) + _or_other_nuisances(explanation, cause, policy)
     probability, ends = likely.get(cause.name, 0.0), cause.at_limits(array)
     if ends:
         probability = min(probability, 1.0 - policy.small)
@@ -193,37 +198,8 @@ def name_cause(
         str(cause.family.separated_by) if same else "",
         why,
         0.0 if without is None else float(fit.log_posterior - without.log_posterior),
-        _unlisted(cause),
     )
     return capped(named, policy, cause.shape)
-
-
-def _unlisted(cause: Cause) -> Unlisted | None:
-    """Return place, dependence and pattern of a cause that the contract has no name for; None of others."""
-    dependence = dependence_of(cause.family)
-    if dependence is None:
-        return None
-    place = str(getattr(cause.family, "grammar_place", cause.family.place))
-    return Unlisted(cause.name, place, dependence.name, cause.place or "one")
-
-
-def _at_most(explanation: Explanation, fit: Fit, cause: Cause) -> str:
-    """Return what a cause without a name goes with, and what it makes where that is largest in the first recording."""
-    dependence = dependence_of(cause.family)
-    if dependence is None:
-        return ""
-    stretch = explanation.stretches[0]
-    spin = fit.point.drives[0].spin.at(stretch.run.t)
-    values = dependence.of(spin)
-    at = int(np.abs(values).argmax())
-    text = f"; it goes with {dependence.words}"
-    if dependence.name == "1" or not values[at]:
-        return text
-    sizes = cause.sizes(stretch.model.array, stretch.index)
-    number = int(np.abs(sizes).argmax())
-    unit = cause.family.sizes(stretch.model.array)[number].unit.split("/(")[0]
-    amount = f"{100 * sizes[number] * values[at]:.2g} %" if unit == "1" else f"{sizes[number] * values[at]:.3g} {unit}"
-    return f"{text}: {amount} at {spin.rate[at]:.3g} rad/s and {spin.acceleration[at]:.3g} rad/s²"
 
 
 def _or_other_nuisances(explanation: Explanation, cause: Cause, policy: Policy) -> str:
@@ -263,7 +239,8 @@ def contested(
             out.append(cause)
             continue
         others = [*(name for name in open_names if name != cause.effect), *cause.not_distinguishable_from]
-        text = cause.would_be_separated_by or str(families[cause.effect].separated_by)
+        family = families.get(cause.effect)
+        text = cause.would_be_separated_by or str(_ANOTHER_RUN if family is None else family.separated_by)
         out.append(replace(cause, not_distinguishable_from=tuple(dict.fromkeys(others)), would_be_separated_by=text))
     return tuple(out)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
@@ -23,7 +23,6 @@ __all__ = [
     "Residual",
     "Rival",
     "Unexplained",
-    "Unlisted",
     "is_in_part",
 ]
 
@@ -36,18 +35,35 @@ class Parameter(Declared):
 
 
 @dataclass(frozen=True)
-class Unlisted(Declared):
-    """What is known of a cause that the contract has no name for."""
+class FunctionTable(Declared):
+    """An unknown function as a table, with its standard deviation."""
 
-    name: Annotated[str, figure("Of an unlisted one: its terms.")]
-    place: Annotated[str, figure("Where in the chain it acts.")]
-    dependence: Annotated[str, figure("Of an unlisted one: function of the motion.")]
-    pattern: Annotated[str, figure("Of an unlisted one: how it is spread over the channels.")]
+    x: Annotated[tuple[float, ...], figure("Values of what it is a function of.")]
+    f: Annotated[tuple[float, ...], figure("The function there; of several components the largest one.")]
+    std: Annotated[tuple[float, ...], figure("Standard deviations of the function.")]
+    x_unit: Annotated[str, figure("Unit of x.")]
+    unit: Annotated[str, figure("Unit of f; 1 of a ratio.")]
 
-    @property
-    def effect(self) -> Annotated[str, figure("The word for all of them.")]:
-        """The word that stands for its effect."""
-        return "unlisted"
+
+@dataclass(frozen=True)
+class Located(Declared):
+    """Something that has no name: where it is and what it goes with."""
+
+    place: Annotated[
+        str,
+        figure("Where in the chain it acts: reference, motion, clock, array, bench, supply, chip or channel."),
+    ]
+    what: Annotated[str, figure("What changes there, such as leans or offset.")]
+    pattern: Annotated[str, figure("Which series share it: one channel, a chip, each its own, or all.")]
+    series: Annotated[tuple[str, ...], figure("Axes, channels or chips that it is of.")]
+    dependence: Annotated[str, figure("What it goes with, such as omega^3; time where nothing else serves.")]
+    text: Annotated[str, figure("The same in words, with its size.")]
+    place_probability: Annotated[float, figure("Probability of the place.")]
+    dependence_probability: Annotated[
+        float | None, figure("Probability of what it goes with; null where that is time alone.")
+    ]
+    instead: Annotated[tuple[str, ...], figure("Descriptions that these data can't separate from it.")] = ()
+    function: Annotated[FunctionTable | None, figure("The function; null where it is not of one quantity.")] = None
 
 
 @dataclass(frozen=True)
@@ -74,7 +90,7 @@ class NamedCause(Declared):
     why: Annotated[str, figure("Where and how it shows, one sentence.")] = ""
     log_odds: Annotated[float, figure("Log odds against the best explanation without it.", "nats")] = 0.0
     unlisted: Annotated[
-        Unlisted | None, figure("Of an effect that the contract has no name for.", flat=True, absent=True)
+        Located | None, figure("Of an effect that the contract has no name for.", flat=True, absent=True)
     ] = None
 
     @property
@@ -149,62 +165,12 @@ class Residual(Declared):
 
 
 @dataclass(frozen=True)
-class FunctionTable(Declared):
-    """An unknown function as a table, with its standard deviation."""
-
-    x: Annotated[tuple[float, ...], figure("Values of what it is a function of.")]
-    f: Annotated[tuple[float, ...], figure("The function there; of several components the largest one.")]
-    std: Annotated[tuple[float, ...], figure("Standard deviations of the function.")]
-    x_unit: Annotated[str, figure("Unit of x.")]
-    unit: Annotated[str, figure("Unit of f; 1 of a ratio.")]
-
-
-@dataclass(frozen=True)
-class Located(Declared):
-    """Something that has no name: where it is and what it goes with."""
-
-    place: Annotated[
-        str,
-        figure("Where in the chain it acts: reference, motion, clock, array, bench, supply, chip or channel."),
-    ]
-    what: Annotated[str, figure("What changes there, such as leans or offset.")]
-    pattern: Annotated[str, figure("Which series share it: one channel, a chip, each its own, or all.")]
-    series: Annotated[tuple[str, ...], figure("Axes, channels or chips that it is of.")]
-    dependence: Annotated[str, figure("What it goes with, such as omega^3; time where nothing else serves.")]
-    text: Annotated[str, figure("The same in words, with its size.")]
-    place_probability: Annotated[float, figure("Probability of the place.")]
-    log_odds: Annotated[float, figure("Log odds against the best description without it.", "nats")]
-    instead: Annotated[tuple[str, ...], figure("Descriptions that these data can't separate from it.")] = ()
-    function: Annotated[FunctionTable | None, figure("The function; null where it is not of one quantity.")] = None
-
-    @property
-    def effect(self) -> Annotated[str, figure("The word of the contract for what has no name.", before="place")]:
-        """The word of the contract for what has no name."""
-        return "unlisted"
-
-
-@dataclass(frozen=True)
 class Unexplained(Declared):
     """What is left and nothing in the library explains."""
 
     significant: Annotated[bool, figure("Whether it is more than chance.")] = False
     signature: Annotated[str, figure("Which channels and which dependence, in words.")] = ""
     log_odds: Annotated[float, figure("Log odds of the strongest term against chance.", "nats")] = 0.0
-    surrogate: Annotated[
-        Mapping[str, float],
-        figure("Coefficients of data-driven terms, such as a11_m_s2: rate²; units in the keys."),
-    ] = field(default_factory=dict)
-    extends_twin: Annotated[
-        bool, figure("Whether these terms are in the extended twin, as they predict validation data.")
-    ] = False
-    left_out: Annotated[
-        int,
-        figure("Terms that are not in it, as they are of absolute time, which another recording has otherwise."),
-    ] = 0
-    located: Annotated[
-        tuple[Located, ...],
-        figure("Where it is and what it goes with, most important first; none where that was not found."),
-    ] = ()
     mistake: Annotated[str, figure("A mistake in the files that makes the simulation fit; empty where none does.")] = ""
 
 

@@ -16,7 +16,6 @@ from gfimu.base.files.atomic_file import write_text
 from gfimu.base.results import Panel, PlottedResult, Series
 from gfimu.base.short_repr import joined
 from gfimu.diagnosis.criticism.gain import Gain
-from gfimu.diagnosis.criticism.views.rigid_motion import RigidMotion
 from gfimu.diagnosis.criticism.views.run_view import RunView
 from gfimu.diagnosis.verdict.parts import (
     Interrupted,
@@ -61,14 +60,6 @@ class Diagnosis(Declared, PlottedResult):
             "nothing outside it, the least of them; null where no cause was inferred."
         ),
     ] = float("nan")
-    coincidence: Annotated[
-        float,
-        figure(
-            "Log odds of the likeliest pattern that binds the free numbers of the causes; null: none can be tested.",
-            "nats",
-            key="coincidence_nats",
-        ),
-    ] = float("nan")
     sentences: Annotated[tuple[str, ...], figure("The verdict in words, most important first.")]
     reference_clock: Annotated[
         ReferenceClock | None, figure("Clock of the reference; null where it was not aligned.")
@@ -80,14 +71,6 @@ class Diagnosis(Declared, PlottedResult):
     residual: Annotated[Residual, figure("Prediction error before and after.")]
     gain: Annotated[Gain, figure("What the extension is worth.")]
     unexplained: Annotated[Unexplained, figure("What nothing in the library explains.")]
-    rigid: Annotated[
-        RigidMotion | None,
-        figure(
-            "How the residual of the given simulation divides into single chips and the whole array; null where that "
-            "can't be tested.",
-            key="rigid_motion",
-        ),
-    ] = None
     rivals: Annotated[tuple[Rival, ...], figure("Other explanations, best first.")]
     noise: Annotated[NoiseLevels, figure("Noise levels that were estimated.")]
     undetermined: Annotated[

@@ -27,8 +27,6 @@ class Notes:
         Size of a calibration residue, in units of what a good calibration leaves; 0 where there is none.
     unreferenced : float
         Time without a reference, s.
-    terms : int, optional
-        Number of terms that describe an unknown, where it was tried.
     loudest : tuple of (str, float, float), optional
         Channel with the largest bias instability, its level, m/s², and that over the median of the others.
     rest : str
@@ -37,7 +35,6 @@ class Notes:
 
     residue: float = 0.0
     unreferenced: float = 0.0
-    terms: int | None = None
     loudest: tuple[str, float, float] | None = None
     rest: str = ""
 
@@ -53,11 +50,10 @@ def verdict_sentences(
 ) -> tuple[str, ...]:
     """Return the verdict in sentences, the most important first; ``withdrawn`` are causes that did not predict."""
     words = [_headline(verdict, causes, unexplained, notes.residue, gain)]
-    words += [f"{cause.effect}: {cause.why}." for cause in causes if cause.why]
+    words += [f"{cause.effect}: {cause.why}." for cause in causes if cause.why and cause.unlisted is None]
+    words += [_sentence(cause.why) for cause in causes if cause.unlisted is not None]
     words += _coincidences(verdict, causes)
-    if verdict == "unknown" and notes.terms is not None:
-        words.append(_surrogate_sentence(notes.terms, unexplained.left_out))
-    if causes or notes.terms:
+    if causes:
         words.append(
             f"The residual falls from {residual.rms_before:.3g} to {residual.rms_after:.3g} m/s²; "
             f"the noise alone is {residual.noise_floor:.3g} m/s²."
@@ -173,36 +169,16 @@ def _headline(verdict: str, causes: Sequence[NamedCause], unexplained: Unexplain
     return f"The simulation is wrong in a way that nothing in the library explains: {unexplained.signature}."
 
 
-def _surrogate_sentence(terms: int, left_out: int) -> str:
-    if not terms and not left_out:
-        return (
-            "No function that is added to channels or reference predicts it on validation data, so the extended twin "
-            "is without it."
-        )
-    clock = ""
-    if left_out:
-        are, them = ("is", "it") if left_out == 1 else ("are", "them")
-        clock = (
-            f" {_many(left_out)} of absolute time {are} left out of the extended twin: another recording has other "
-            f"phases, and no second one confirms {them}."
-        )
-    if not terms:
-        return clock.strip()
-    what = "of the motion or the angle" if left_out else "of the motion, the angle or time"
-    verb = "describe" if terms > 1 else "describes"
-    return f"{_many(terms)} {what} {verb} it in the extended twin, without a name.{clock}"
-
-
-def _many(functions: int) -> str:
-    return f"{functions} functions" if functions > 1 else "One function"
-
-
 def _residue_sentence(scale: float) -> str:
     times = "what" if scale == 1.0 else f"{scale:g} times what"
     return (
         f"The twin's calibration is a little off everywhere, by {times} a good calibration leaves of bias, gain, axes "
         "and position; no single cause stands behind that, and the extended twin has the corrections."
     )
+
+
+def _sentence(text: str) -> str:
+    return f"{text[:1].upper()}{text[1:]}."
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 from gfimu.array.array import AccelerometerArray
 from gfimu.base.errors import InputError
 from gfimu.base.units import STANDARD_GRAVITY
-from gfimu.model.generic_basis import OF_READING, UNIT_KEYS, Motion, basis_function, is_of_time, unit_parameters
 from gfimu.model.own_rig.places import Pattern, Size, channel_patterns
-from gfimu.model.parameter_units import NAME, RATIO
-from gfimu.model.world_model import BasisUnits, SpinState
+from gfimu.model.parameter_units import RATIO
+from gfimu.model.world_model import SpinState
 
-__all__ = ["Cause", "Moment", "Parameter", "Presence", "UnnamedCause", "bias_cause", "gain_cause"]
+__all__ = ["Cause", "Moment", "Parameter", "Presence", "bias_cause", "gain_cause"]
 
 Parameter = Size
 """A parameter of a simulation that may be wrong: key, unit, and the usual size of its error."""
@@ -26,7 +25,6 @@ _BIAS = 20e-3 * STANDARD_GRAVITY  # m/s²: of MEMS chips that were not calibrate
 _BIAS_LEFT = 0.3e-3 * STANDARD_GRAVITY  # m/s²: what a good calibration leaves
 _GAIN, _GAIN_LEFT = 0.02, 5e-4
 _LARGEST_GAIN = 0.3  # more is another unit
-_UNNAMED = 0.1  # m/s²
 
 
 @dataclass(frozen=True)
@@ -43,13 +41,13 @@ class Presence:
 
     Parameters
     ----------
-    cause : Cause or UnnamedCause
+    cause : Cause
         What it is of.
     parameters : dict
         Differences from the values of the simulation, by key; those that are left out are zero.
     """
 
-    cause: Cause | UnnamedCause
+    cause: Cause
     parameters: dict[str, Any]
 
     @property
@@ -209,98 +207,3 @@ def gain_cause(array: AccelerometerArray, *, prior_std: float = _GAIN) -> Cause:
         "gain",
         tolerance=_GAIN_LEFT,
     )
-
-
-@dataclass(frozen=True)
-class UnnamedCause:
-    """What no cause explains: one function of `gfimu.model.generic_basis`, sized per channel or for the reference.
-
-    Parameters
-    ----------
-    dependence : str
-        Name of the function.
-    units : BasisUnits
-        What rate, acceleration and time are divided by.
-    of_reference : bool
-        Whether it is added to the reference instead of the channels.
-    """
-
-    dependence: str
-    units: BasisUnits
-    of_reference: bool = False
-
-    name = "unknown"
-    summary = "a dependence that the data show and no cause explains"
-    separated_by = "another run with another motion: what stays is in the rig or the sensors"
-    place = "sensing"
-    per_run = False
-    inexactness = 0.0
-    starts: tuple[float, ...] = ()
-
-    @property
-    def of_one_recording(self) -> bool:
-        """Whether the function is of absolute time, which another recording has otherwise."""
-        return is_of_time(self.dependence)
-
-    def __call__(self, parameters: Mapping[str, Any]) -> Presence:
-        """Return the term with its coefficients, which name their function in reports and files."""
-        return Presence(self, {"dependence": self.dependence, **unit_parameters(self.units), **parameters})
-
-    @classmethod
-    def of_file(cls, parameters: Mapping[str, Any]) -> Presence:
-        """Return a term from the parameters that a twin file holds; raises `InputError` for those of no term."""
-        try:
-            units = BasisUnits(*(float(parameters[key]) for key in UNIT_KEYS))
-            dependence = str(parameters["dependence"])
-        except (KeyError, TypeError, ValueError) as error:
-            raise InputError(
-                f"effect 'unknown': {error} is missing or no number; take the file as it was written"
-            ) from None
-        return cls(dependence, units, "reference_rad_s" in parameters)(parameters)
-
-    def sizes(self, array: AccelerometerArray) -> tuple[Size, ...]:
-        """Return a coefficient per channel, or the one of the reference."""
-        if self.of_reference:
-            return (Size("reference_rad_s", "rad/s", _UNNAMED),)
-        return tuple(Size(f"{name}_m_s2", "m/s²", _UNNAMED) for name in array.channels)
-
-    def parameter_units(self, array: AccelerometerArray) -> Mapping[str, str]:
-        """Return the unit of each parameter."""
-        return {"dependence": NAME} | UNIT_KEYS | {one.key: one.unit for one in self.sizes(array)}
-
-    def patterns(self, array: AccelerometerArray) -> tuple[Pattern, ...]:
-        """Return one place: every coefficient free."""
-        return (Pattern("", np.eye(len(self.sizes(array)))),)
-
-    def reach(self, array: AccelerometerArray) -> NDArray[np.bool_] | None:
-        """Return that each coefficient changes its own channel."""
-        return None if self.of_reference else np.eye(array.n_channels, dtype=bool)
-
-    def shapes(self, duration: float, sample_rate: float) -> tuple[dict[str, float], ...]:
-        """Return no shape."""
-        return ({},)
-
-    def from_sizes(
-        self, array: AccelerometerArray, values: NDArray[np.float64], shape: Mapping[str, float]
-    ) -> Presence:
-        """Return the term with its coefficients."""
-        return self({one.key: float(value) for one, value in zip(self.sizes(array), values, strict=True)})
-
-    def on_readings(
-        self, readings: NDArray[np.float64], values: NDArray[np.float64], moment: Moment
-    ) -> NDArray[np.float64]:
-        """Return readings (n, c) with the term of the channels added."""
-        if self.of_reference:
-            return readings
-        if self.dependence == OF_READING:
-            return readings + values * (readings / STANDARD_GRAVITY) ** 3
-        return readings + np.outer(self._function(moment), values)
-
-    def on_reference(
-        self, reading: NDArray[np.float64], values: NDArray[np.float64], moment: Moment
-    ) -> NDArray[np.float64]:
-        """Return the reference (n,) with the term of the reference added."""
-        return reading + values[0] * self._function(moment) if self.of_reference else reading
-
-    def _function(self, moment: Moment) -> NDArray[np.float64]:
-        return basis_function(self.dependence)(Motion.of(moment.state, moment.since_start, self.units))

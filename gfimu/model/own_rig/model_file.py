@@ -13,7 +13,7 @@ from gfimu.base.files.input_file import is_ordinary
 from gfimu.base.files.model_files import read_toml
 from gfimu.base.files.schema import Table, about, read
 from gfimu.base.plugins import plugins
-from gfimu.model.own_rig.cause import UnnamedCause
+from gfimu.model.located.effect import UNLISTED, LocatedEffect
 from gfimu.model.own_rig.simulator import SimulatorModel
 from gfimu.model.user_code import user_function
 from gfimu.model.world_model import Effect, WorldModel
@@ -77,10 +77,10 @@ def _of_file(path: Path, *, allow_code: bool) -> WorldModel | None:
         families = model.families()
         effects: list[Effect] = []
         for one in file.effect:
-            _check_kinds(one)
-            if one.name == UnnamedCause.name:
-                effects.append(UnnamedCause.of_file(one.parameters))
+            if one.name == UNLISTED:
+                effects.append(LocatedEffect.of_parameters(one.parameters, model.array))
                 continue
+            _check_kinds(one)
             check_name("effect", one.name, families)
             effects.append(families[one.name](one.parameters))
         return model.extended(effects)
@@ -88,9 +88,8 @@ def _of_file(path: Path, *, allow_code: bool) -> WorldModel | None:
 
 def _check_kinds(effect: RigEffect) -> None:
     for key, value in effect.parameters.items():
-        if isinstance(value, str) != (key == "dependence"):
-            kind = "text" if key == "dependence" else "a number"
-            raise InputError(f"effect {effect.name!r}: {key} = {value!r} must be {kind}")
+        if not isinstance(value, int | float):
+            raise InputError(f"effect {effect.name!r}: {key} = {value!r} must be a number")
 
 
 def _made(function: Callable[[], object], source: str) -> WorldModel:

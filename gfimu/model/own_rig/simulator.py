@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import tomli_w
@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 
 from gfimu.array.array import AccelerometerArray
 from gfimu.base.errors import InputError
-from gfimu.model.own_rig.cause import Cause, Moment, Presence, UnnamedCause
-from gfimu.model.world_model import BasisUnits, Effect, EffectFamily, ExpectedNoise, Spin, SpinState, WorldModel
+from gfimu.model.located.effect import LocatedEffect
+from gfimu.model.located.rig_state import RigState
+from gfimu.model.own_rig.cause import Cause, Moment, Presence
+from gfimu.model.world_model import Effect, EffectFamily, ExpectedNoise, Spin, SpinState, WorldModel
 
 __all__ = ["Simulate", "SimulatorModel"]
 
@@ -70,7 +72,7 @@ class SimulatorModel:
     quantum: float = 1e-3
     full_scale: float = 16.0 * 9.80665
     drive_source: str = "tacho"
-    effects: tuple[Presence, ...] = ()
+    effects: tuple[Presence | LocatedEffect, ...] = ()
     source: str = ""
 
     def __post_init__(self) -> None:
@@ -91,13 +93,9 @@ class SimulatorModel:
         """Return the causes by name."""
         return {cause.name: cause for cause in self.causes}
 
-    def searching(self, *, wide: bool) -> SimulatorModel:
-        """Return the model itself: it has one library of causes."""
-        return self
-
-    def unnamed(self, dependence: str, units: BasisUnits, *, of_reference: bool = False) -> EffectFamily:
-        """Return what no cause explains as one more: a function of `gfimu.model.generic_basis` per channel."""
-        return UnnamedCause(dependence, units, of_reference)
+    def described(self, parameters: Mapping[str, Any]) -> LocatedEffect:
+        """Return an error without a name as an effect, from its parameters."""
+        return LocatedEffect.of_parameters(parameters, self.array)
 
     def placed(self, mounting: NDArray[np.float64] | None = None) -> None:
         """Return None: only the simulation knows how its array stands."""
@@ -122,17 +120,24 @@ class SimulatorModel:
         """
         present = (*self.effects, *_own(effects))
         parameters = {one.key: 0.0 for cause in self.causes if not cause.of_channels for one in cause.parameters}
-        for one in present:
+        causes = [one for one in present if isinstance(one, Presence)]
+        for one in causes:
             for key, value in one.parameters.items():
                 if key in parameters:
                     parameters[key] += float(value)
         moment = Moment(spin.at(t), t - (t[0] if start is None else start))
         readings, reference = self.simulate(moment.state, t, parameters)
         self._check(readings, reference, len(t))
-        for one in present:
+        for one in causes:
             values = one.size_values(self.array)
             readings = one.cause.on_readings(readings, values, moment)
             reference = one.cause.on_reference(reference, values, moment)
+        period = float(np.median(np.diff(t))) if len(t) > 1 else 1.0
+        state = RigState(moment.since_start, moment.state, readings, temperature, period, None)
+        for other in present:
+            if isinstance(other, LocatedEffect):
+                added = other.added(state)
+                readings, reference = readings + added[:, :-1], reference + added[:, -1]
         return readings, reference
 
     def _check(self, readings: NDArray[np.float64], reference: NDArray[np.float64], n: int) -> None:
@@ -178,9 +183,9 @@ if TYPE_CHECKING:
         return model
 
 
-def _own(effects: Sequence[Effect]) -> list[Presence]:
-    own = [effect for effect in effects if isinstance(effect, Presence)]
+def _own(effects: Sequence[Effect]) -> list[Presence | LocatedEffect]:
+    own = [effect for effect in effects if isinstance(effect, Presence | LocatedEffect)]
     if len(own) < len(effects):
-        foreign = ", ".join(effect.name for effect in effects if not isinstance(effect, Presence))
+        foreign = ", ".join(effect.name for effect in effects if not isinstance(effect, Presence | LocatedEffect))
         raise InputError(f"not causes of this simulation: {foreign}; build them with its families")
     return own

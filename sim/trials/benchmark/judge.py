@@ -23,6 +23,7 @@ from sim.trials.benchmark.judged import Judged
 from sim.trials.benchmark.real import beyond_stated, held_out_recording, prediction_error, real_task
 from sim.trials.benchmark.release import MEASURED, find_case
 from sim.trials.benchmark.truth_file import Fixed, fixed_world
+from sim.trials.benchmark.unlisted import PLACES_OF_LISTED, SAME_PLACE
 from sim.trials.benchmark.world import FreshMotion, Truth
 from sim.trials.worlds.z_scores import z_scores
 
@@ -51,7 +52,7 @@ LEAST_MOVED = 15.0
 """d′ that what is hidden must have in the fresh motion for its removal to be measured."""
 
 _WHERE_NO_NAME_IS_RIGHT = 2.0  # times the points of ``unknown``
-_NOT_A_NAME = "unknown"
+_NOT_A_NAME, _DESCRIBED = "unknown", "unlisted"
 
 
 @dataclass(frozen=True)
@@ -130,8 +131,15 @@ def _judged(answer: Answer, fixed: Fixed) -> Judged:
 
 
 def name_of(cause: CauseAnswer) -> str:
-    """Return the name by which a cause is judged."""
+    """Return the name by which a cause is judged; of a description without one its place."""
+    if cause.effect == _DESCRIBED and not cause.name:
+        return f"{_DESCRIBED}: {place_of(cause)}"
     return cause.name or cause.effect
+
+
+def place_of(cause: CauseAnswer) -> str:
+    """Return the place of a description in the words of `PLACES`."""
+    return SAME_PLACE.get(cause.place, cause.place)
 
 
 def claims_of(answer: Answer) -> list[Claim]:
@@ -172,8 +180,11 @@ def outcome_of(answer: Answer, fixed: Fixed) -> tuple[str, float]:
 
 
 def _outcome_of_listed(truth: Truth, claims: Sequence[Claim]) -> str:
+    """Return the outcome by names; the place of a hidden effect, without its name, stands for it as a set does."""
     waiting = {name for name, _ in truth.hidden}
-    alone = all(len(claim.names) == 1 for claim in claims)
+    described = {place_of(cause) for claim in claims for cause in claim.causes if cause.effect == _DESCRIBED}
+    claims = [claim for claim in claims if not any(cause.effect == _DESCRIBED for cause in claim.causes)]
+    alone = not described and all(len(claim.names) == 1 for claim in claims)
     others = []
     for claim in claims:
         found = waiting & claim.names
@@ -187,6 +198,11 @@ def _outcome_of_listed(truth: Truth, claims: Sequence[Claim]) -> str:
             return "wrong"
         waiting.discard(tied[0])
         alone = False
+    for place in sorted(described):
+        there = {name for name, _ in truth.hidden if place in PLACES_OF_LISTED.get(name, ())}
+        if not there:
+            return "wrong"
+        waiting -= there
     if waiting:
         return "part"
     return "alone" if alone else "set"
@@ -203,8 +219,8 @@ def _outcome_of_unlisted(truth: Truth, claims: Sequence[Claim]) -> str:
 
 
 def _describes(cause: CauseAnswer, truth: Truth) -> bool:
-    """Whether a cause describes what is hidden by its place; one that states a name or a dependence is judged by it."""
-    return cause.effect == "unlisted" and not cause.name and not cause.dependence and cause.place == truth.place
+    """Whether a cause describes what is hidden by its place; one that states a name is judged by that."""
+    return cause.effect == _DESCRIBED and not cause.name and place_of(cause) == truth.place
 
 
 def _scores(claims: Sequence[Claim], truth: Truth) -> list[float]:

@@ -17,6 +17,7 @@ from gfimu.base.units import MILLI_G
 from gfimu.diagnosis.design.distinguishability import energy_left, normal_equations, plan_contenders
 from gfimu.diagnosis.design.planned_run import PlannedRun, planned
 from gfimu.diagnosis.verdict.library import standing_out
+from gfimu.diagnosis.verdict.parts import Located
 from gfimu.diagnosis.verdict.verdict import Diagnosis
 from gfimu.model.user_code import user_function
 from gfimu.recording import Recording
@@ -212,8 +213,11 @@ def processor_time() -> float:
 def outcome_of(diagnosis: Diagnosis, truth: Sequence[tuple[str, Mapping[str, Any]]]) -> dict[str, Any]:
     """Return what the tables need of a diagnosis whose truth is known."""
     hidden = dict(truth)
-    causes = []
+    causes, located = [], []
     for cause in diagnosis.causes:
+        if cause.unlisted is not None:
+            located.append({"text": cause.why, "log_odds": cause.log_odds, **_place_of(cause.unlisted)})
+            continue
         scores = z_scores(cause.parameters, cause.std, hidden[cause.effect]) if cause.effect in hidden else {}
         causes.append(
             {
@@ -238,12 +242,16 @@ def outcome_of(diagnosis: Diagnosis, truth: Sequence[tuple[str, Mapping[str, Any
         "unexplained": diagnosis.unexplained.significant,
         "unexplained_nats": diagnosis.unexplained.log_odds,
         "library_probability": diagnosis.library_probability,
-        "coincidence_nats": diagnosis.coincidence,
-        "rigid": None if diagnosis.rigid is None else diagnosis.rigid.to_dict(),
+        "located": located,
         "signature": diagnosis.unexplained.signature,
         "noise": diagnosis.noise.to_dict(),
         "truth": {name: {key: _plain(value) for key, value in parameters.items()} for name, parameters in truth},
     }
+
+
+def _place_of(found: Located) -> dict[str, Any]:
+    keys = ("place", "what", "dependence", "place_probability", "dependence_probability")
+    return {key: getattr(found, key) for key in keys}
 
 
 def _plain(value: Any) -> Any:

@@ -15,7 +15,6 @@ from scipy.fft import rfft
 from scipy.signal import welch
 from scipy.stats import gamma
 
-from gfimu.diagnosis.criticism.generic import FEWEST_CYCLES
 from gfimu.diagnosis.criticism.views.dependence import listed
 from gfimu.diagnosis.criticism.views.run_view import RunView
 from gfimu.diagnosis.data.cosine_basis import CosineBasis
@@ -26,6 +25,7 @@ __all__ = ["ResidualSpectrum", "SpectralLine", "order_spectrum", "time_spectrum"
 _CELLS_PER_TURN = 64  # numerical: four cells in a cycle of the highest order
 _FEWEST_TURNS = 3.0  # numerical: two cycles per revolution are then well apart
 _SLOWEST_ORDER, _HIGHEST_ORDER = 0.9, 16.0  # numerical: cycles per revolution that are looked at
+_FEWEST_CYCLES = 10  # numerical: of a tone in a run; slow functions follow what is slower
 _NEIGHBOURS = 50  # numerical: frequencies whose median is the level of the noise
 _NARROW, _WIDE = 2, 16  # numerical: frequencies on either side that a line and a hump are
 _LONGEST_WINDOW = 2048  # numerical: samples of a periodogram that is averaged
@@ -116,7 +116,7 @@ def time_spectrum(
     noise = np.sqrt(2 * period * (np.mean(run.white[alive] ** 2) + slow))
     scale = 2.0 / np.sqrt(n) * run.white
     lines = [
-        _strongest_line(np.abs(rfft(one, axis=0)) / np.sqrt(n), 1 / (n * period), scale, FEWEST_CYCLES)
+        _strongest_line(np.abs(rfft(one, axis=0)) / np.sqrt(n), 1 / (n * period), scale, _FEWEST_CYCLES)
         for one in standard
     ]
     return ResidualSpectrum(

@@ -7,11 +7,19 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import uniform_filter1d
 
 from gfimu.array.array import AccelerometerArray
-from gfimu.diagnosis.data.table.rig_state import RigState
-from gfimu.diagnosis.terms.located.dependences import (
+from gfimu.diagnosis.terms.located.policy import LOCATED
+from gfimu.diagnosis.terms.located.term import LocatedTerm
+from gfimu.model.located.dependences import (
+    ACCELERATION,
+    ANGLE,
+    FORCES,
+    RATE,
+    RATE_SQUARED,
+    TEMPERATURE,
+    TIME,
+    WARMING,
     Dependence,
     Form,
     LowPassed,
@@ -23,62 +31,15 @@ from gfimu.diagnosis.terms.located.dependences import (
     Revolution,
     curve_over,
 )
-from gfimu.diagnosis.terms.located.operators import channel_place, rig_places
-from gfimu.diagnosis.terms.located.policy import LOCATED
-from gfimu.diagnosis.terms.located.term import LocatedTerm
+from gfimu.model.located.operators import channel_place, rig_places
+from gfimu.model.located.rig_state import RigState
+from gfimu.model.located.usual import USUAL
 
 __all__ = ["ChannelTerms", "channel_patterns", "channel_terms", "chip_groups", "dependences", "rig_terms"]
 
 _Floats = NDArray[np.float64]
 ChannelPattern = tuple[str, str, tuple[tuple[int, ...], ...], tuple[str, ...]]
 """Place of the contract, pattern, groups of channels that share an error, and names of the groups."""
-
-RATE = Regressor("omega", "the rate", "rad/s", lambda state: state.spin.rate)
-ACCELERATION = Regressor("alpha", "the angular acceleration", "rad/s²", lambda state: state.spin.acceleration)
-ANGLE = Regressor("theta", "the angle turned", "rad", lambda state: state.spin.angle)
-TIME = Regressor("t", "time", "s", lambda state: state.t)
-_NOTHING = Regressor("1", "nothing", "", lambda state: np.ones_like(state.t))
-
-
-def _rate_squared(state: RigState) -> _Floats:
-    return np.asarray(state.spin.rate**2)
-
-
-def _force_along_x(state: RigState) -> _Floats:
-    """Return the force of an unbalance along x of the room, over its mass and arm, (n,), rad²/s²."""
-    angle = state.spin.angle
-    return np.asarray(_rate_squared(state) * np.cos(angle) + state.spin.acceleration * np.sin(angle))
-
-
-def _force_along_y(state: RigState) -> _Floats:
-    """Return the same along y."""
-    angle = state.spin.angle
-    return np.asarray(_rate_squared(state) * np.sin(angle) - state.spin.acceleration * np.cos(angle))
-
-
-_SQUARE = Regressor("omega^2", "the rate squared", "rad²/s²", _rate_squared)
-_FORCES = (
-    Regressor("unbalance x", "an unbalance", "rad²/s²", _force_along_x),
-    Regressor("unbalance y", "an unbalance", "rad²/s²", _force_along_y),
-)
-
-
-def _temperature(state: RigState) -> _Floats:
-    if state.temperature is None:
-        raise ValueError("the recording has no temperature")
-    return state.temperature
-
-
-TEMPERATURE = Regressor("T", "the temperature", "°C", _temperature)
-
-
-def _warming(state: RigState) -> _Floats:
-    """Return how fast the temperature changes over two seconds, K/s."""
-    smooth = uniform_filter1d(_temperature(state), max(int(2.0 / state.period), 3))
-    return np.asarray(np.gradient(smooth, state.period))
-
-
-_WARMING = Regressor("dT/dt", "the rate of change of the temperature", "K/s", _warming)
 
 
 def _largest(states: Sequence[RigState], regressor: Regressor) -> float:
@@ -92,34 +53,11 @@ def dependences(states: Sequence[RigState]) -> dict[str, Dependence]:
     usual = max(float(np.sqrt(np.mean(seen["alpha"] ** 2))) / 2.0, 0.05)  # numerical
     slow = max(rate / 6.0, 0.05)  # numerical
     first, turned = float(seen["theta"][0]), max(float(np.ptp(seen["theta"])), 1e-9)  # numerical
-    forms = [
-        Form("1", "1", "always", _NOTHING, np.asarray, 1.0),
-        *(
-            Form(name, "omega", f"in proportion to {words}", RATE, function, rate**power)
-            for name, words, function, power in (
-                ("omega", "the rate", lambda x: x, 1),
-                ("omega^2", "rate²", lambda x: x**2, 2),
-                ("omega^3", "rate³", lambda x: x**3, 3),
-                ("omega^4", "rate⁴", lambda x: x**4, 4),
-                ("|omega|", "|rate|", np.abs, 1),
-                ("omega|omega|", "rate · |rate|", lambda x: x * np.abs(x), 2),
-            )
-        ),
-        Form("alpha", "alpha", "in proportion to the angular acceleration", ACCELERATION, np.asarray, acceleration),
-        Form("|alpha|", "alpha", "in proportion to |angular acceleration|", ACCELERATION, np.abs, acceleration),
-        Form(
-            "alpha omega",
-            "omega, alpha",
-            "in proportion to rate · angular acceleration",
-            ACCELERATION,
-            np.asarray,
-            acceleration * rate,
-            RATE,
-        ),
-        Form("theta", "theta", "in proportion to the angle turned", ANGLE, lambda x: x - first, turned),
-        Form("t", "t", "in proportion to time", TIME, np.asarray, float(seen["t"].max()), None, of_one_recording=True),
-    ]
-    lengths, of_two = LOCATED.lengths, (LOCATED.product_functions, (LOCATED.product_length,))
+    scales = {"1": 1.0, "omega": rate, "omega^2": rate**2, "omega^3": rate**3, "omega^4": rate**4, "|omega|": rate}
+    scales |= {"omega|omega|": rate**2, "alpha": acceleration, "|alpha|": acceleration}
+    scales |= {"alpha omega": acceleration * rate, "t": float(seen["t"].max())}
+    forms = [*(Form(name, scale) for name, scale in scales.items()), Form("theta", turned, first)]
+    lengths, of_two = USUAL.lengths, (LOCATED.product_functions, (LOCATED.product_length,))
     curves = [
         curve_over(RATE, seen["omega"], LOCATED.rate_functions, lengths, warp=slow),
         curve_over(ACCELERATION, seen["alpha"], LOCATED.acceleration_functions, lengths, warp=usual),
@@ -129,10 +67,7 @@ def dependences(states: Sequence[RigState]) -> dict[str, Dependence]:
             curve_over(RATE, seen["omega"], *of_two, warp=slow),
             curve_over(ACCELERATION, seen["alpha"], *of_two, warp=usual),
         ),
-        Revolution("revolution", lambda state: np.ones_like(state.t)),
-        Revolution("revolution |omega|", lambda state: np.abs(state.spin.rate) / rate),
-        Revolution("revolution omega^2", lambda state: state.spin.rate**2 / rate**2),
-        Revolution("revolution omega", lambda state: state.spin.rate / rate),
+        *(Revolution(f"revolution{growth}", rate) for growth in ("", " |omega|", " omega^2", " omega")),
         Memory(ACCELERATION, acceleration),
     ]
     return {one.name: one for one in (*forms, *curves, *_of_temperature(states))}
@@ -141,15 +76,15 @@ def dependences(states: Sequence[RigState]) -> dict[str, Dependence]:
 def _of_temperature(states: Sequence[RigState]) -> list[Dependence]:
     if any(state.temperature is None for state in states):
         return []
-    seen = np.concatenate([_temperature(state) for state in states])
+    seen = np.concatenate([TEMPERATURE.of(state) for state in states])
     first, spread = float(seen[0]), float(np.ptp(seen))
     if not spread > LOCATED.warmed:
         return []
-    steep = max(float(np.std(np.concatenate([_warming(state) for state in states]))), 1e-9)  # numerical
+    steep = max(float(np.std(np.concatenate([WARMING.of(state) for state in states]))), 1e-9)  # numerical
     return [
-        Form("T", "T", "in proportion to the temperature", TEMPERATURE, lambda x: x - first, spread),
+        Form("T", spread, first),
         curve_over(TEMPERATURE, seen, LOCATED.temperature_functions, LOCATED.temperature_lengths),
-        Form("dT/dt", "T", "in proportion to the warming", _WARMING, np.asarray, steep),
+        Form("dT/dt", steep),
         LowPassed(TEMPERATURE, first, spread),
     ]
 
@@ -170,6 +105,7 @@ _OF_PLACE = {
     "moves": ("1", *_OF_RIG, "memory of alpha"),
     "stretches": ("1", *_OF_RIG),
     "shakes": (*_OF_RIG, "memory of alpha"),
+    "heaves": (*_OF_RIG, "memory of alpha"),
     "tilts": ("1", *_OF_RIG),
     "gain": ("1", *_OF_RIG, "f(omega, alpha)", "t"),
 }
@@ -177,12 +113,19 @@ _OF_PLACE = {
 
 def rig_terms(states: Sequence[RigState], every: dict[str, Dependence], *, is_angle: bool) -> list[LocatedTerm]:
     """Return the terms of places in the rig, but those of waves that are looked for."""
-    places = rig_places(is_angle=is_angle)
-    terms = [LocatedTerm(places[what], every[n]) for what, names in _OF_PLACE.items() for n in names if n in every]
+    places = rig_places(is_angle=is_angle, has_geometry=states[0].placed is not None)
+    terms = [
+        LocatedTerm(place, every[name])
+        for what, place in places.items()
+        for name in _OF_PLACE.get(what, ())
+        if name in every
+    ]
     displacement, acceleration = (0,), (2,)
     followed = dict.fromkeys(("leans", "moves", "tilts"), displacement)
-    for what, outputs in (followed | {"reads": (0, 1, 2), "shakes": acceleration}).items():
-        regressors = _FORCES if places[what].name == "bench" else (ACCELERATION, _SQUARE)
+    for what, outputs in (followed | {"reads": (0, 1, 2), "shakes": acceleration, "heaves": acceleration}).items():
+        if what not in places:
+            continue
+        regressors = FORCES if places[what].name == "bench" else (ACCELERATION, RATE_SQUARED)
         terms += [LocatedTerm(places[what], mode) for mode in _modes(states, regressors, outputs)]
     return terms
 
@@ -226,10 +169,9 @@ def channel_terms(
     clocks += [("clock", "own", chips, names)] if len(chips) > 1 else []
     each = channel_patterns(array)
     most = max(float(np.abs(state.readings).max()) for state in states)
-    readings: list[Dependence] = [OfReading("f(y)", "as a function of the reading", most)]
-    readings += [OfReading(f"y^{n}", f"in proportion to reading{p}", most, n) for n, p in ((2, "²"), (3, "³"))]
+    readings = [OfReading(most, power) for power in (0, 2, 3)]
     offsets = [one for name, one in every.items() if name not in ("memory of alpha", "revolution omega")]
-    modes = _modes(states, (ACCELERATION, _SQUARE), (2,))
+    modes = _modes(states, (ACCELERATION, RATE_SQUARED), (2,))
     gains = ("1", "f(omega)", "f(t)", "omega", "omega^2", "|omega|", "t", "f(T)")
     late = ("1", "t", "f(t)")
     return [

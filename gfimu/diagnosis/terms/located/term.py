@@ -11,18 +11,17 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from gfimu.array.array import AccelerometerArray
-from gfimu.diagnosis.data.table.rig_state import AddedEffect, RigState
 from gfimu.diagnosis.terms.cause import Cause
 from gfimu.diagnosis.terms.columns import Columns
-from gfimu.diagnosis.terms.located.dependences import Dependence
-from gfimu.diagnosis.terms.located.operators import Operator, Place
+from gfimu.model.located.dependences import Dependence
+from gfimu.model.located.effect import LocatedEffect, derivatives
+from gfimu.model.located.operators import Operator, Place
+from gfimu.model.located.rig_state import RigState
 from gfimu.model.own_rig.places import Size
 
-__all__ = ["UNLISTED", "LocatedEffect", "LocatedTerm", "located_columns"]
+__all__ = ["LocatedTerm", "is_located", "located_columns"]
 
 _Floats = NDArray[np.float64]
-UNLISTED = "unlisted"
-"""The word of the contract for an effect without a name."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +42,6 @@ class LocatedTerm:
     dependence: Dependence
     pattern: str = "all"
 
-    name = UNLISTED
     summary = "an unknown function at a place"
     separated_by = "another run with another motion"
     place = "located"
@@ -52,7 +50,7 @@ class LocatedTerm:
     starts: tuple[float, ...] = ()
 
     @property
-    def label(self) -> str:
+    def name(self) -> str:
         """Place, pattern and dependence, which identify it."""
         series = "" if self.pattern == "all" else f" {', '.join(self.where.components)}"
         return f"{self.where.name} {self.where.what}{series}: {self.dependence.name}"
@@ -94,12 +92,12 @@ class LocatedTerm:
     def __call__(self, parameters: Mapping[str, Any]) -> LocatedEffect:
         """Build the effect without coefficients."""
         del parameters
-        return LocatedEffect(self, np.zeros(self.count))
+        return LocatedEffect(self.where, self.dependence, self.pattern, np.zeros(self.count))
 
     def from_sizes(self, array: AccelerometerArray, values: _Floats, shape: Mapping[str, float]) -> LocatedEffect:
         """Build the effect from its coefficients."""
         del array, shape
-        return LocatedEffect(self, np.asarray(values))
+        return LocatedEffect(self.where, self.dependence, self.pattern, np.asarray(values))
 
     def mixing(self, length: int) -> _Floats:
         """Return the root (P, k) of the prior of all coefficients for one of the length scales."""
@@ -107,50 +105,12 @@ class LocatedTerm:
 
     def cause(self, length: int, coordinates: _Floats, log_prior: float) -> Cause:
         """Return the cause with coordinates in the prior of one of the length scales."""
-        return Cause(self, self.label, self.mixing(length), {}, coordinates, log_prior)
+        return Cause(self, self.name, self.mixing(length), {}, coordinates, log_prior)
 
 
-class LocatedEffect(AddedEffect):
-    """A located term with its coefficients."""
-
-    name = UNLISTED
-    acts_back = False
-
-    def __init__(self, term: LocatedTerm, coefficients: _Floats) -> None:
-        self.term, self.coefficients = term, coefficients
-
-    @property
-    def memory_s(self) -> float:
-        """How long it remembers the drive, s."""
-        return self.term.dependence.memory_s
-
-    def size_values(self, array: AccelerometerArray) -> _Floats:
-        """Return the coefficients."""
-        del array
-        return self.coefficients
-
-    def functions(self, state: RigState) -> _Floats:
-        """Return the error of each component at the samples, (m, n), or (m, c + 1, n) where each has its own."""
-        basis, parts = self.term.dependence.values(state), len(self.term.where.components)
-        return np.stack([basis @ part for part in np.split(self.coefficients, parts)])
-
-    def added(self, state: RigState) -> _Floats:
-        """Return what it adds to channels and reference, shape (n, c + 1)."""
-        total = np.zeros((len(state.t), state.readings.shape[1] + 1))
-        for operator, function in zip(self.term.where.operators(state), self.functions(state), strict=True):
-            columns = np.atleast_2d(function).T  # (n, 1) or (n, c + 1)
-            for part, values in zip(operator.parts, _derivatives(operator, columns, state.period), strict=False):
-                total += 0.0 if part is None else part * values
-        return total
-
-
-def _derivatives(operator: Operator, values: _Floats, period: float) -> list[_Floats]:
-    """Return values (n, …) and as many of their derivatives by time as an operator takes."""
-    found = [values]
-    last = max(order for order, part in enumerate(operator.parts) if part is not None)
-    for _ in range(last):
-        found.append(np.gradient(found[-1], period, axis=0, edge_order=2))
-    return found
+def is_located(cause: Cause) -> bool:
+    """Whether a cause has no name but a place."""
+    return isinstance(cause.family, LocatedTerm)
 
 
 def located_columns(term: LocatedTerm, state: RigState, weight: _Floats) -> Columns:
@@ -159,10 +119,10 @@ def located_columns(term: LocatedTerm, state: RigState, weight: _Floats) -> Colu
     count, observations = term.dependence.count, weight.shape[1]
     places: list[list[NDArray[np.intp]]] = [[] for _ in range(observations)]
     parts: list[list[_Floats]] = [[] for _ in range(observations)]
-    shared = [] if basis.ndim == 3 else _derivatives(_longest(operators), basis, state.period)
+    shared = [] if basis.ndim == 3 else derivatives(_longest(operators), basis, state.period)
     for index, operator in enumerate(operators):
         for c in operator.reached:
-            own = shared or _derivatives(operator, basis[c], state.period)
+            own = shared or derivatives(operator, basis[c], state.period)
             column = np.zeros((len(state.t), count))
             for part, values in zip(operator.parts, own, strict=False):
                 column += 0.0 if part is None else part[:, [c]] * values

@@ -7,19 +7,22 @@ these: they win where they serve, as they have fewer coefficients, and they extr
 
 from __future__ import annotations
 
+import re
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
+from scipy.ndimage import uniform_filter1d
 from scipy.signal import cont2discrete, lfilter, ss2tf
 
 from gfimu.base.units import STANDARD_GRAVITY
-from gfimu.diagnosis.data.table.rig_state import RigState
-from gfimu.diagnosis.terms.located.policy import LOCATED
+from gfimu.model.located.rig_state import RigState
+from gfimu.model.located.usual import USUAL
 
 __all__ = [
     "Curve",
@@ -61,12 +64,67 @@ class Regressor:
     of: Callable[[RigState], _Floats]
 
 
+RATE = Regressor("omega", "the rate", "rad/s", lambda state: state.spin.rate)
+ACCELERATION = Regressor("alpha", "the angular acceleration", "rad/s²", lambda state: state.spin.acceleration)
+ANGLE = Regressor("theta", "the angle turned", "rad", lambda state: state.spin.angle)
+TIME = Regressor("t", "time", "s", lambda state: state.t)
+NOTHING = Regressor("1", "nothing", "", lambda state: np.ones_like(state.t))
+
+
+def _rate_squared(state: RigState) -> _Floats:
+    return np.asarray(state.spin.rate**2)
+
+
+def _force_along_x(state: RigState) -> _Floats:
+    """Return the force of an unbalance along x of the room, over its mass and arm, (n,), rad²/s²."""
+    angle = state.spin.angle
+    return np.asarray(_rate_squared(state) * np.cos(angle) + state.spin.acceleration * np.sin(angle))
+
+
+def _force_along_y(state: RigState) -> _Floats:
+    """Return the same along y."""
+    angle = state.spin.angle
+    return np.asarray(_rate_squared(state) * np.sin(angle) - state.spin.acceleration * np.cos(angle))
+
+
+RATE_SQUARED = Regressor("omega^2", "the rate squared", "rad²/s²", _rate_squared)
+FORCES = (
+    Regressor("unbalance x", "an unbalance", "rad²/s²", _force_along_x),
+    Regressor("unbalance y", "an unbalance", "rad²/s²", _force_along_y),
+)
+
+
+def _temperature(state: RigState) -> _Floats:
+    if state.temperature is None:
+        raise ValueError("the recording has no temperature")
+    return state.temperature
+
+
+TEMPERATURE = Regressor("T", "the temperature", "°C", _temperature)
+
+
+def _warming(state: RigState) -> _Floats:
+    """Return how fast the temperature changes over two seconds, K/s."""
+    smooth = uniform_filter1d(_temperature(state), max(int(2.0 / state.period), 3))
+    return np.asarray(np.gradient(smooth, state.period))
+
+
+WARMING = Regressor("dT/dt", "the rate of change of the temperature", "K/s", _warming)
+
+
+REGRESSORS = {
+    one.name: one for one in (RATE, ACCELERATION, ANGLE, TIME, NOTHING, RATE_SQUARED, *FORCES, TEMPERATURE, WARMING)
+}
+"""By name."""
+
+
 class Dependence(ABC):
     """A linear family of functions of what a rig does.
 
     ``name`` identifies it in ``verdict.json``, ``kind`` is the same for all that mean the same to a person, ``words``
     say how an error goes with it, ``looks`` is what it costs to have been chosen among many alike, nats, ``memory_s``
-    how long it remembers the drive, and ``of_one_recording`` whether it is of absolute time.
+    how long it remembers the drive, ``of_one_recording`` whether it is of absolute time, and ``is_slow`` whether
+    averages over some hundredths of a second show it as well.
     """
 
     name: str
@@ -75,6 +133,7 @@ class Dependence(ABC):
     looks: float = 0.0
     memory_s: float = 0.0
     of_one_recording: bool = False
+    is_slow: bool = True
 
     @property
     @abstractmethod
@@ -100,26 +159,61 @@ class Dependence(ABC):
         """Number K of functions."""
         return len(self.roots[0])
 
+    @property
+    @abstractmethod
+    def numbers(self) -> dict[str, Any]:
+        """What makes it, beside its name: numbers, or names, as a file holds them (`dependence_of`)."""
+
 
 def _covariance_root(centres: _Floats, length: float) -> _Floats:
     """Return a root (K, k) of the squared-exponential covariance at centres (K,)."""
     power, turn = np.linalg.eigh(np.exp(-0.5 * ((centres[:, None] - centres) / length) ** 2))
-    kept = power > LOCATED.least_prior * power[-1]
+    kept = power > USUAL.least_prior * power[-1]
     return np.asarray(turn[:, kept] * np.sqrt(power[kept]))
+
+
+_Function = Callable[[_Floats], _Floats]
+_FORMS: dict[str, tuple[str, str, Regressor, _Function, Regressor | None]] = {
+    "1": ("1", "always", NOTHING, np.asarray, None),
+    "omega": ("omega", "in proportion to the rate", RATE, np.asarray, None),
+    "omega^2": ("omega", "in proportion to rate²", RATE, np.square, None),
+    "omega^3": ("omega", "in proportion to rate³", RATE, lambda x: x**3, None),
+    "omega^4": ("omega", "in proportion to rate⁴", RATE, lambda x: x**4, None),
+    "|omega|": ("omega", "in proportion to |rate|", RATE, np.abs, None),
+    "omega|omega|": ("omega", "in proportion to rate · |rate|", RATE, lambda x: x * np.abs(x), None),
+    "alpha": ("alpha", "in proportion to the angular acceleration", ACCELERATION, np.asarray, None),
+    "|alpha|": ("alpha", "in proportion to |angular acceleration|", ACCELERATION, np.abs, None),
+    "alpha omega": ("omega, alpha", "in proportion to rate · angular acceleration", ACCELERATION, np.asarray, RATE),
+    "theta": ("theta", "in proportion to the angle turned", ANGLE, np.asarray, None),
+    "t": ("t", "in proportion to time", TIME, np.asarray, None),
+    "T": ("T", "in proportion to the temperature", TEMPERATURE, np.asarray, None),
+    "dT/dt": ("T", "in proportion to the warming", WARMING, np.asarray, None),
+}
+"""Of each one-number form its kind, its words, the regressor, the function, and a regressor that multiplies it."""
 
 
 @dataclass(frozen=True)
 class Form(Dependence):
-    """One function of a regressor x times a number: ``function`` of x over ``scale``."""
+    """A one-number form by its name, over ``scale``; the regressor counts from ``first``."""
 
     name: str
-    kind: str
-    words: str
-    regressor: Regressor
-    function: Callable[[_Floats], _Floats]
     scale: float
-    times: Regressor | None = None
-    of_one_recording: bool = False
+    first: float = 0.0
+
+    @property
+    def kind(self) -> str:  # type: ignore[override]
+        """The same for all that mean the same to a person."""
+        return _FORMS[self.name][0]
+
+    @property
+    def words(self) -> str:  # type: ignore[override]
+        """How an error goes with it."""
+        return _FORMS[self.name][1]
+
+    @property
+    def of_one_recording(self) -> bool:  # type: ignore[override]
+        """Whether it is of absolute time."""
+        return self.name == "t"
 
     @property
     def roots(self) -> tuple[_Floats, ...]:
@@ -129,28 +223,56 @@ class Form(Dependence):
     @property
     def abscissa(self) -> Regressor | None:
         """What a picture of the function is drawn over."""
-        return None if self.times or not self.regressor.unit else self.regressor
+        _, _, regressor, _, times = _FORMS[self.name]
+        return None if times or not regressor.unit else regressor
+
+    @property
+    def numbers(self) -> dict[str, Any]:
+        """What makes it."""
+        return {"scale": self.scale, "first": self.first}
 
     def values(self, state: RigState) -> _Floats:
         """Return the functions at the samples."""
-        values = self.function(self.regressor.of(state)) / self.scale
-        return (values if self.times is None else values * self.times.of(state))[:, None]
+        _, _, regressor, function, times = _FORMS[self.name]
+        values = function(regressor.of(state) - self.first) / self.scale
+        return np.asarray(values if times is None else values * times.of(state))[:, None]
 
 
 @dataclass(frozen=True)
 class Curve(Dependence):
     """A smooth function of one regressor: cubic B-splines of asinh(x / warp), or of x itself where ``warp`` is 0."""
 
-    name: str
-    kind: str
-    words: str
     regressor: Regressor
     low: float
     high: float
     functions: int
-    lengths: tuple[float, ...]
+    lengths: tuple[float, ...] = USUAL.lengths
     warp: float = 0.0
-    of_one_recording: bool = False
+
+    @property
+    def name(self) -> str:  # type: ignore[override]
+        """Name in ``verdict.json``."""
+        return f"f({self.regressor.name})"
+
+    @property
+    def kind(self) -> str:  # type: ignore[override]
+        """The same for all that mean the same to a person."""
+        return self.regressor.name
+
+    @property
+    def words(self) -> str:  # type: ignore[override]
+        """How an error goes with it."""
+        return f"as a function of {self.regressor.words}"
+
+    @property
+    def of_one_recording(self) -> bool:  # type: ignore[override]
+        """Whether it is of absolute time."""
+        return self.regressor is TIME
+
+    @property
+    def numbers(self) -> dict[str, Any]:
+        """What makes it."""
+        return {"low": self.low, "high": self.high, "functions": self.functions, "warp": self.warp}
 
     @cached_property
     def grid(self) -> _Floats:
@@ -184,9 +306,7 @@ def curve_over(
     regressor: Regressor, seen: _Floats, functions: int, lengths: tuple[float, ...], *, warp: float = 0.0
 ) -> Curve:
     """Return a smooth function over the range of a regressor that was seen (n,)."""
-    low, high = float(seen.min()), float(seen.max())
-    name, words = f"f({regressor.name})", f"as a function of {regressor.words}"
-    return Curve(name, regressor.name, words, regressor, low, high, functions, lengths, warp, regressor.name == "t")
+    return Curve(regressor, float(seen.min()), float(seen.max()), functions, lengths, warp)
 
 
 @dataclass(frozen=True)
@@ -195,6 +315,11 @@ class Product(Dependence):
 
     first: Curve
     second: Curve
+
+    @property
+    def numbers(self) -> dict[str, Any]:
+        """What makes it."""
+        return {"first": self.first.numbers, "second": self.second.numbers}
 
     @property
     def name(self) -> str:  # type: ignore[override]
@@ -222,15 +347,30 @@ class Product(Dependence):
         return (one[:, :, None] * other[:, None, :]).reshape(len(one), -1)
 
 
+_ENVELOPES: dict[str, Callable[[_Floats], _Floats]] = {
+    "revolution": np.ones_like,
+    "revolution |omega|": np.abs,
+    "revolution omega^2": np.square,
+    "revolution omega": np.asarray,
+}
+"""Of a function of the angle within a revolution, what it grows with: a function of the rate over the fastest one."""
+
+
 @dataclass(frozen=True)
 class Revolution(Dependence):
-    """A function of the angle within a revolution, by harmonics, times an envelope."""
+    """A function of the angle within a revolution, by harmonics, times what its name says of the rate over ``scale``."""
 
     name: str
-    envelope: Callable[[RigState], _Floats]
-    harmonics: int = LOCATED.harmonics
+    scale: float = 1.0
+    harmonics: int = USUAL.harmonics
     kind: str = "revolution"
     words: str = "by the angle within a revolution"
+    is_slow = False
+
+    @property
+    def numbers(self) -> dict[str, Any]:
+        """What makes it."""
+        return {"scale": self.scale, "harmonics": self.harmonics}
 
     @property
     def roots(self) -> tuple[_Floats, ...]:
@@ -242,7 +382,7 @@ class Revolution(Dependence):
         """Return the functions at the samples."""
         phase = np.outer(state.spin.angle, np.arange(1, self.harmonics + 1))
         waves = np.stack([np.cos(phase), np.sin(phase)], axis=2).reshape(len(phase), -1)
-        return np.asarray(waves * self.envelope(state)[:, None])
+        return np.asarray(waves * _ENVELOPES[self.name](state.spin.rate / self.scale)[:, None])
 
 
 @dataclass(frozen=True)
@@ -265,7 +405,14 @@ class Wave(Dependence):
     apart: float
     of_time: bool = False
     fastest: float = 0.0
-    looks: float = LOCATED.wave_looks
+    looks: float = USUAL.wave_looks
+
+    is_slow = False
+
+    @property
+    def numbers(self) -> dict[str, Any]:
+        """What makes it."""
+        return {"cycles": self.cycles, "fastest": self.fastest}
 
     @property
     def name(self) -> str:  # type: ignore[override]
@@ -307,9 +454,7 @@ class Wave(Dependence):
         """Return the functions at the samples."""
         phase = self.cycles * (2.0 * np.pi * state.t if self.of_time else state.spin.angle)
         speed = np.abs(state.spin.rate)
-        envelope = (
-            speed / self.fastest if self.fastest else np.where(self.of_time | (speed > LOCATED.turning), 1.0, 0.0)
-        )
+        envelope = speed / self.fastest if self.fastest else np.where(self.of_time | (speed > USUAL.turning), 1.0, 0.0)
         return np.asarray(np.column_stack([np.cos(phase), np.sin(phase)]) * envelope[:, None])
 
 
@@ -319,7 +464,14 @@ class Memory(Dependence):
 
     regressor: Regressor
     scale: float
-    lags_s: tuple[float, ...] = LOCATED.lags_s
+    lags_s: tuple[float, ...] = USUAL.lags_s
+
+    is_slow = False
+
+    @property
+    def numbers(self) -> dict[str, Any]:
+        """What makes it."""
+        return {"scale": self.scale}
 
     @property
     def name(self) -> str:  # type: ignore[override]
@@ -345,7 +497,7 @@ class Memory(Dependence):
     def roots(self) -> tuple[_Floats, ...]:  # type: ignore[override]
         """Roots of the prior covariance, one for each length scale."""
         lags = np.array(self.lags_s)
-        return np.hstack([_covariance_root(lags, LOCATED.lag_length_s), LOCATED.rough * np.eye(len(lags))]), np.eye(
+        return np.hstack([_covariance_root(lags, USUAL.lag_length_s), USUAL.rough * np.eye(len(lags))]), np.eye(
             len(lags)
         )
 
@@ -362,7 +514,12 @@ class LowPassed(Dependence):
     regressor: Regressor
     first: float
     scale: float
-    times_s: tuple[float, ...] = LOCATED.filter_times_s
+    times_s: tuple[float, ...] = USUAL.filter_times_s
+
+    @property
+    def numbers(self) -> dict[str, Any]:
+        """What makes it."""
+        return {"first": self.first, "scale": self.scale}
 
     @property
     def name(self) -> str:  # type: ignore[override]
@@ -399,8 +556,16 @@ class Mode(Dependence):
     scale: float
     frequency_hz: float
     outputs: tuple[int, ...] = (0, 1, 2)
-    damping: float = LOCATED.damping
-    looks: float = LOCATED.mode_looks
+    damping: float = USUAL.damping
+    looks: float = USUAL.mode_looks
+
+    is_slow = False
+
+    @property
+    def numbers(self) -> dict[str, Any]:
+        """What makes it."""
+        shape = {"frequency_hz": self.frequency_hz, "damping": self.damping}
+        return {**shape, "outputs": list(self.outputs), "scale": self.scale}
 
     @property
     def name(self) -> str:  # type: ignore[override]
@@ -419,14 +584,14 @@ class Mode(Dependence):
 
     def near(self, width: float) -> list[Dependence]:
         """Return dependences of another shape nearby."""
-        faster, damped = np.exp(LOCATED.spacing * width * np.arange(-2, 3)), np.exp(width * np.arange(-1, 2))
+        faster, damped = np.exp(USUAL.spacing * width * np.arange(-2, 3)), np.exp(width * np.arange(-1, 2))
         pairs = [(self.frequency_hz * f, self.damping * z) for f in faster for z in damped]
         return [replace(self, frequency_hz=float(f), damping=float(min(z, 1.0))) for f, z in pairs]
 
     @property
     def memory_s(self) -> float:  # type: ignore[override]
         """How long it remembers the drive, s."""
-        return LOCATED.forgotten / (2.0 * np.pi * self.frequency_hz * self.damping)
+        return USUAL.forgotten / (2.0 * np.pi * self.frequency_hz * self.damping)
 
     @property
     def roots(self) -> tuple[_Floats, ...]:
@@ -453,26 +618,34 @@ class Mode(Dependence):
 class OfReading(Dependence):
     """A function of each channel's own reading: its power, or a smooth one up to the largest reading."""
 
-    name: str
-    words: str
     most: float
     power: int = 0
     kind: str = "own reading"
 
+    @property
+    def name(self) -> str:  # type: ignore[override]
+        """Name in ``verdict.json``."""
+        return f"y^{self.power}" if self.power else "f(y)"
+
+    @property
+    def words(self) -> str:  # type: ignore[override]
+        """How an error goes with it."""
+        return (
+            f"in proportion to reading{'²' if self.power == 2 else '³'}"
+            if self.power
+            else "as a function of the reading"
+        )
+
+    @property
+    def numbers(self) -> dict[str, Any]:
+        """What makes it."""
+        return {"most": self.most}
+
     @cached_property
     def _curve(self) -> Curve:
         reading = Regressor("y", "the reading", "m/s²", lambda state: state.t)
-        return Curve(
-            self.name,
-            self.kind,
-            self.words,
-            reading,
-            -self.most,
-            self.most,
-            LOCATED.reading_functions,
-            LOCATED.lengths,
-            self.most / LOCATED.harmonics,
-        )
+        functions, warp = USUAL.reading_functions, self.most / USUAL.harmonics
+        return Curve(reading, -self.most, self.most, functions, warp=warp)
 
     @property
     def roots(self) -> tuple[_Floats, ...]:
@@ -483,5 +656,52 @@ class OfReading(Dependence):
         """Return the functions at the samples."""
         readings = np.column_stack([state.readings, np.zeros(len(state.t))]).T  # (c + 1, n)
         if self.power:
-            return (readings[:, :, None] / STANDARD_GRAVITY) ** self.power
+            return np.asarray((readings[:, :, None] / STANDARD_GRAVITY) ** self.power)
         return np.stack([self._curve.at(mine) for mine in readings])
+
+
+_MADE: tuple[tuple[str, Callable[[re.Match[str], Mapping[str, Any]], Dependence]], ...] = (
+    (r"f\((\w+), (\w+)\)", lambda m, n: Product(_curve(m[1], n["first"]), _curve(m[2], n["second"]))),
+    (r"f\(y\)|y\^([23])", lambda m, n: OfReading(float(n["most"]), int(m[1] or 0))),
+    (r"f\((\w+)\)", lambda m, n: _curve(m[1], n)),
+    (r"revolution.*", lambda m, n: Revolution(_one_of(m[0], _ENVELOPES), float(n["scale"]), int(n["harmonics"]))),
+    (r"order .*", lambda m, n: Wave(float(n["cycles"]), 1.0, fastest=float(n["fastest"]))),
+    (r"memory of (.*)", lambda m, n: Memory(_regressor(m[1]), float(n["scale"]))),
+    (r"(\w+) lagging", lambda m, n: LowPassed(_regressor(m[1]), float(n["first"]), float(n["scale"]))),
+    (r"mode at .* of (.*)", lambda m, n: _mode(_regressor(m[1]), n)),
+    (r".*", lambda m, n: Form(_one_of(m[0], _FORMS), float(n["scale"]), float(n["first"]))),
+)
+"""Patterns of names, and what makes the dependence from its name and its numbers."""
+
+
+def dependence_of(name: str, numbers: Mapping[str, Any]) -> Dependence:
+    """Return a dependence from its name and its `Dependence.numbers`.
+
+    Raises
+    ------
+    KeyError, TypeError, ValueError
+        If there is none of that name, or a number is missing or none.
+    """
+    for pattern, made in _MADE:
+        if match := re.fullmatch(pattern, name):
+            return made(match, numbers)
+    raise KeyError(name)
+
+
+def _one_of(name: str, known: Mapping[str, Any]) -> str:
+    known[name]
+    return name
+
+
+def _regressor(name: str) -> Regressor:
+    return REGRESSORS[name]
+
+
+def _curve(name: str, numbers: Mapping[str, Any]) -> Curve:
+    low, high, warp = (float(numbers[key]) for key in ("low", "high", "warp"))
+    return Curve(_regressor(name), low, high, int(numbers["functions"]), warp=warp)
+
+
+def _mode(regressor: Regressor, numbers: Mapping[str, Any]) -> Mode:
+    scale, frequency, damping = (float(numbers[key]) for key in ("scale", "frequency_hz", "damping"))
+    return Mode(regressor, scale, frequency, tuple(int(one) for one in numbers["outputs"]), damping)

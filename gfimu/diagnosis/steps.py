@@ -1,31 +1,28 @@
-"""The diagnosis by one library of effects: explain, look at the lack of fit, hold out, conclude."""
+"""The steps of a diagnosis after its samples are read: search, places, validation, verdict."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from gfimu.diagnosis.criticism.coincidence.bound_numbers import Coincidence, coincidences
 from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.criticism.holdout import Holdout, gate_gains, held_out_gain, other_recordings, split
 from gfimu.diagnosis.criticism.lack_of_fit import LackOfFit, lack_of_fit
 from gfimu.diagnosis.criticism.series_tests import NOTHING
-from gfimu.diagnosis.criticism.surrogate import surrogates
-from gfimu.diagnosis.data.body.stretch import BodyStretch, make_body_stretches
+from gfimu.diagnosis.data.body.stretch import make_body_stretches
 from gfimu.diagnosis.data.prepared_runs import PreparedRuns
 from gfimu.diagnosis.data.stretch import Stretch, make_stretches
 from gfimu.diagnosis.fit.gauss_newton import Fit
 from gfimu.diagnosis.fit.learn import starting_point
 from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.search.beam import Blocks, promise
+from gfimu.diagnosis.search.challenge import challenged
 from gfimu.diagnosis.search.explain import Explanation, reduced
 from gfimu.diagnosis.search.long_run import understand_any_length
 from gfimu.diagnosis.search.nuisance_models import Understanding
-from gfimu.diagnosis.search.screening import screen
-from gfimu.diagnosis.verdict.conclude import Described, conclude, is_dominant, is_unknown, named_causes
+from gfimu.diagnosis.terms.located.term import is_located
+from gfimu.diagnosis.verdict.conclude import conclude, is_dominant, is_unknown, named_causes
 from gfimu.diagnosis.verdict.gate import impossible_sizes, judge, measurable
 from gfimu.diagnosis.verdict.library import LibraryEvidence, with_library
 from gfimu.diagnosis.verdict.naming import conflicting
@@ -33,12 +30,11 @@ from gfimu.diagnosis.verdict.parts import Interrupted, NamedCause
 from gfimu.diagnosis.verdict.verdict import Diagnosis
 from gfimu.model.world_model import WorldModel, is_of_one_recording
 
-__all__ = ["STAGES", "WIDER", "LibraryDiagnosis", "Report", "interrupted", "stretches_of"]
+__all__ = ["STAGES", "Report", "Steps", "interrupted", "stretches_of"]
 
 Report = Callable[[float, str], None]
 
-WIDER = "wider library"
-STAGES = ("samples", "search", "lack of fit", "validation", WIDER, "place")
+STAGES = ("samples", "search", "places", "validation")
 """Stages of a diagnosis in order, as an interrupted one lists them."""
 
 
@@ -48,8 +44,8 @@ def stretches_of(model: WorldModel, prepared: PreparedRuns) -> tuple[Stretch, ..
     return make(model, prepared.runs, prepared.effects)
 
 
-class LibraryDiagnosis:
-    """The steps of a diagnosis by the library of one model.
+class Steps:
+    """The steps of one diagnosis; ``stage`` is the one that goes on.
 
     Parameters
     ----------
@@ -69,32 +65,26 @@ class LibraryDiagnosis:
         self._prepared, self._kept, self._model, self._policy, self._report = prepared, kept, model, policy, report
         self.stage = STAGES[1]
 
-    def understood(self, models: Collection[str] | None = None) -> Understanding:
-        """Return what a search finds, under some models of the nuisance parameters only or under all."""
+    def understood(self) -> Understanding:
+        """Return the most probable causes of the library."""
         stretches, progress = stretches_of(self._model, self._prepared), self._report
-        return understand_any_length(
-            stretches, self._policy, lambda share, text: progress(0.05 + 0.8 * share, text), models=models
-        )
+        return understand_any_length(stretches, self._policy, lambda share, text: progress(0.05 + 0.6 * share, text))
 
-    def promise(self, understanding: Understanding, others: Collection[str]) -> float:
-        """Return by how much sets with other effects are more probable than what was found, in a linear world, nats."""
-        stretches, best = stretches_of(self._model, self._prepared), understanding.explanation.best
-        blocks = Blocks(screen(stretches, best.point, only=others), self._policy)
-        return promise(blocks, best.causes, others, self._policy)
+    def challenged(self, understanding: Understanding) -> Understanding:
+        """Return the same with located terms beside the causes of the library and instead of them."""
+        self.stage = STAGES[2]
+        self._report(0.65, self.stage)
+        return replace(understanding, explanation=challenged(understanding.explanation, self._policy))
 
     def verdict(self, understanding: Understanding) -> Diagnosis:
         """Return the verdict on what a search found."""
         policy, progress = self._policy, self._report
-        self.stage = STAGES[2]
-        progress(0.88, self.stage)
+        self.stage = STAGES[3]
+        progress(0.88, "lack of fit")
         understanding, left = self._apart_from_the_rest(understanding)
         withdrawn: list[str] = []
-        bound = self._coincidence(understanding.explanation)
-        if bound is not None and bound.log_odds > policy.steady:
-            return self._described(understanding, left, withdrawn, bound.sentence)
         gain = Gain()
         if not is_dominant(understanding.explanation, left, policy):
-            self.stage = STAGES[3]
             progress(0.92, "hold out")
             try:
                 understanding, withdrawn = self._gated(understanding)
@@ -102,20 +92,18 @@ class LibraryDiagnosis:
                 progress(0.97, "measure the gain")
                 gain = self._gain(understanding.explanation, understanding.explanation.best)
             except np.linalg.LinAlgError:
-                return self._described(understanding, left, withdrawn, "the causes found can't be fitted to part of it")
+                return self._unknown(understanding, left, withdrawn, "the causes found can't be fitted to part of it")
         if is_unknown(understanding.explanation, left, gain, policy):
-            return self._described(understanding, left, withdrawn, "")
+            return self._unknown(understanding, left, withdrawn, "")
         found = conclude(self._prepared, understanding, left, gain, policy, withdrawn=withdrawn)
         refuted = self._impossible(understanding.explanation)
-        if refuted:  # a twin with such sizes leaves nothing that is worth a description
-            return conclude(
-                self._prepared, understanding, left, Gain(), policy, withdrawn=withdrawn, refuted=refuted, unknown=True
-            )
+        if refuted:
+            return self._unknown(understanding, left, withdrawn, refuted)
         fitted = understanding.explanation.best.names
         inferred = [cause for cause in found.causes if cause.effect in fitted]
         refuted = judge(gain, found.residual, inferred, policy, found.unexplained).why
         if refuted:
-            return self._described(understanding, left, withdrawn, refuted)
+            return self._unknown(understanding, left, withdrawn, refuted)
         gained = measurable(gain)
         if gained is not gain:
             found = conclude(self._prepared, understanding, left, gained, policy, withdrawn=withdrawn)
@@ -147,14 +135,11 @@ class LibraryDiagnosis:
 
     def _doubted(self, found: Diagnosis, explanation: Explanation) -> Diagnosis:
         """Return a verdict whose probabilities include that the truth is outside the library."""
-        bound = self._coincidence(explanation)
         confirmed = found.gain.of_other_recording and found.gain.share_of_excess_removed >= 1.0 - self._policy.small
-        nats = float("nan") if bound is None else bound.log_odds
         left = max(found.unexplained.log_odds, self._policy.lack_odds if found.unexplained.significant else 0.0)
-        evidence = LibraryEvidence(float(np.nan_to_num(nats)), left, confirmed)
         fits = [explanation.best, *conflicting(explanation, self._policy)]
         shapes = {cause.name: tuple(cause.shape) for fit in fits for cause in fit.causes}
-        return with_library(replace(found, coincidence=nats), evidence, shapes, self._policy)
+        return with_library(found, LibraryEvidence(left, confirmed), shapes, self._policy)
 
     def _apart_from_the_rest(self, understanding: Understanding) -> tuple[Understanding, LackOfFit]:
         """Drop causes that explain less than what no cause explains: they would be made of it.
@@ -192,16 +177,18 @@ class LibraryDiagnosis:
         return other_recordings(explanation.stretches, fit, stretches, self._policy)
 
     def _gated(self, understanding: Understanding) -> tuple[Understanding, list[str]]:
-        """Withdraw causes that do not predict held-out data."""
+        """Withdraw causes that do not predict held-out data; a function of absolute time can't, and stays."""
         explanation, withdrawn = understanding.explanation, []
         if not explanation.best.causes:
             return understanding, []
         pairs = self._pairs(explanation, explanation.best, np.inf)
-        while explanation.best.causes:
+        while True:
             best = explanation.best
-            gains = gate_gains(best, explanation.without, pairs, self._policy, other_recording=self._kept is not None)
-            worst = min(gains, key=gains.__getitem__)
-            if gains[worst] >= self._policy.ambiguous:
+            of_time = {c.name for c in best.causes if is_located(c) and is_of_one_recording(c.family)}
+            without = {name: fewer for name, fewer in explanation.without.items() if name not in of_time}
+            gains = gate_gains(best, without, pairs, self._policy, other_recording=self._kept is not None)
+            worst = min(gains, key=gains.__getitem__, default=None)
+            if worst is None or gains[worst] >= self._policy.ambiguous:
                 break
             withdrawn.append(worst)
             explanation = reduced(explanation, worst, self._policy)
@@ -216,15 +203,6 @@ class LibraryDiagnosis:
         gain = held_out_gain(fit.causes, self._pairs(explanation, fit), self._policy, label=label)
         return replace(gain, of_other_recording=self._kept is not None)
 
-    def _coincidence(self, explanation: Explanation) -> Coincidence | None:
-        """Return what most likely binds the numbers of the causes that nothing should bind; None where nothing can."""
-        first = explanation.stretches[0]
-        if isinstance(first, BodyStretch):  # its motion has no arms that all recordings share
-            return None
-        mounting = Rotation.from_rotvec(first.run.mounting).as_matrix()
-        found = coincidences(explanation.best, self._model.array, mounting)
-        return found[0] if found else None
-
     def _impossible(self, explanation: Explanation) -> str:
         """Return the signature where every set that the data can't distinguish holds a size beyond physics."""
         families, array = self._model.families(), self._model.array
@@ -234,53 +212,15 @@ class LibraryDiagnosis:
         ]
         return found[0] if all(found) else ""
 
-    def _describing(self, explanation: Explanation, whole: Fit) -> tuple[Described, Gain]:
-        """Return a description with what it is worth on held-out data, and which of its terms the twin gets.
-
-        Terms of absolute time have the phase of one recording: only another one can confirm them.
-        """
-        gain = self._gain(explanation, whole)
-        kept = tuple(cause for cause in whole.causes if not is_of_one_recording(cause.family))
-        carried = replace(whole, point=replace(whole.point, causes=kept)) if kept else None
-        if len(kept) < len(whole.causes) and self._kept is not None:
-            alone = self._gain(explanation, carried) if carried is not None else Gain()
-            samples = sum(len(run.t) for run in self._kept.runs)
-            better = gain.log_likelihood_per_sample - float(np.nan_to_num(alone.log_likelihood_per_sample))
-            carried, gain = (whole, gain) if better * samples > self._policy.ambiguous else (carried, alone)
-        elif carried is not None and (
-            gain.share_in_any_recording <= 0.0 or not self._carries_over(explanation, carried)
-        ):
-            carried = None
-        return Described(whole, carried), gain
-
-    def _carries_over(self, explanation: Explanation, described: Fit) -> bool:
-        """Whether one half of a run predicts the other: blocks in between follow what changes with time."""
-        if self._kept is not None:
-            return True
-        halves = held_out_gain(described.causes, self._pairs(explanation, described, np.inf), self._policy, label="")
-        return not halves.share_of_excess_removed < self._policy.least_share
-
-    def _described(
-        self, understanding: Understanding, left: LackOfFit, withdrawn: Sequence[str], refuted: str
-    ) -> Diagnosis:
-        """Return the verdict unknown, with the description that predicts the validation data best, if one does."""
-        explanation, described, gain = understanding.explanation, None, Gain()
-        body = isinstance(explanation.stretches[0], BodyStretch)  # its motion has no functions to describe it by
-        found = [] if body else surrogates(explanation.stretches, explanation.nothing, self._policy, left.hints)
-        for one in found:
-            tried, worth = self._describing(explanation, one.fit)
-            better = worth.log_likelihood_per_sample > float(np.nan_to_num(gain.log_likelihood_per_sample))
-            # Less than a tenth of the excess describes nothing.
-            if better and not worth.share_of_excess_removed < self._policy.small:
-                described, gain = tried, worth
+    def _unknown(self, understanding: Understanding, left: LackOfFit, withdrawn: list[str], refuted: str) -> Diagnosis:
+        """Return the verdict unknown."""
         return conclude(
             self._prepared,
             understanding,
             left,
-            gain,
+            Gain(),
             self._policy,
             withdrawn=withdrawn,
-            described=described,
             refuted=refuted,
             unknown=True,
         )

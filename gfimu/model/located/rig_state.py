@@ -32,8 +32,8 @@ class RigState:
         Temperature of the board, °C.
     period : float
         Sample period, s.
-    placed : PlacedArray
-        The array on the table.
+    placed : PlacedArray, optional
+        The array on the table; None where the simulation does not say how it stands.
     """
 
     t: NDArray[np.float64]
@@ -41,7 +41,13 @@ class RigState:
     readings: NDArray[np.float64]
     temperature: NDArray[np.float64] | None
     period: float
-    placed: PlacedArray
+    placed: PlacedArray | None
+
+    @property
+    def on_table(self) -> PlacedArray:
+        """The array on the table, where the simulation says how it stands."""
+        assert self.placed is not None
+        return self.placed
 
 
 class AddedEffect(ABC):

@@ -18,14 +18,14 @@ Each is A φ + B φ̇ + C φ̈ with A, B and C per observation.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.diagnosis.data.table.rig_state import RigState
-from gfimu.diagnosis.terms.located.policy import LOCATED
+from gfimu.model.located.rig_state import RigState
+from gfimu.model.located.usual import USUAL
 
 __all__ = ["Operator", "Place", "channel_place", "rig_places"]
 
@@ -73,6 +73,8 @@ class Place:
         Names of its components: axes, channels or chips.
     operators : callable
         From the state of the rig to the operator of each component.
+    of_angle : bool
+        Whether the reference that it is an error of is an angle.
     """
 
     name: str
@@ -82,11 +84,21 @@ class Place:
     usual: float
     components: tuple[str, ...]
     operators: Callable[[RigState], Sequence[Operator]]
+    of_angle: bool = False
 
 
-def rig_places(*, is_angle: bool) -> dict[str, Place]:
-    """Return the places in the rig, by what the error there is; ``is_angle`` of a reference that is an angle."""
-    read, usual = "rad" if is_angle else "rad/s", LOCATED
+def rig_places(*, is_angle: bool, has_geometry: bool = True) -> dict[str, Place]:
+    """Return the places in the rig, by what the error there is.
+
+    Parameters
+    ----------
+    is_angle : bool
+        Whether the reference is an angle.
+    has_geometry : bool
+        Whether the simulation says how its array stands on a table; without that only places of the reference and of
+        all channels alike are known.
+    """
+    read, usual = "rad" if is_angle else "rad/s", USUAL
     x, xy, xyz = ("",), ("x", "y"), ("x", "y", "z")
     late, turns = partial(_is_late, is_angle), partial(_turns, is_angle)
     places = (
@@ -98,10 +110,18 @@ def rig_places(*, is_angle: bool) -> dict[str, Place]:
         Place("array", "stretches", "the array stretches away from the axis", "1", usual.ratio, x, _stretches),
         Place("array", "vibrates", "the array vibrates with the table", "m/s²", usual.shakes_m_s2, xyz, _vibrates),
         Place("bench", "shakes", "the bench shakes", "m/s²", usual.shakes_m_s2, xyz, _shakes),
+        Place("bench", "heaves", "the bench shakes up and down", "m/s²", usual.shakes_m_s2, ("z",), _heaves),
         Place("bench", "tilts", "the axis tilts in the room", "rad", usual.leans_rad, xy, _tilts),
         Place("supply", "gain", "the gain of all channels changes", "1", usual.ratio, x, _gain_of_all),
     )
-    return {place.what: place for place in places}
+    return {
+        place.what: replace(place, of_angle=is_angle)
+        for place in places
+        if has_geometry or place.what in _WITHOUT_GEOMETRY
+    }
+
+
+_WITHOUT_GEOMETRY = ("reads", "late", "gain")
 
 
 def channel_place(name: str, kind: str, groups: _Groups, labels: Sequence[str]) -> Place:
@@ -146,7 +166,7 @@ def _observed(channels: _Floats, reference: _Floats | float = 0.0) -> _Floats:
 
 def _of_moved(state: RigState, moved: _Floats) -> tuple[_Floats, _Floats, _Floats]:
     """Return A, B and C (n, c) of chips that move by φ times vectors (c, 3)."""
-    axes, rate = state.placed.axes, state.spin.rate
+    axes, rate = state.on_table.axes, state.spin.rate
     across = _across(moved)
     beside, inward = _along(axes, across), _along(axes, _across(across))
     of_value = np.outer(state.spin.acceleration, beside) + np.outer(rate**2, inward)
@@ -167,7 +187,7 @@ def _is_late(is_angle: bool, state: RigState) -> list[Operator]:
 
 
 def _turns(is_angle: bool, state: RigState) -> list[Operator]:
-    axes, across = state.placed.axes, _across(state.placed.places)
+    axes, across = state.on_table.axes, _across(state.on_table.places)
     by_rate = np.outer(2.0 * state.spin.rate, _along(axes, _across(across)))
     by_acceleration = np.tile(_along(axes, across), (len(state.t), 1))
     of_angle = _observed(np.zeros_like(by_rate), float(is_angle))
@@ -175,15 +195,15 @@ def _turns(is_angle: bool, state: RigState) -> list[Operator]:
 
 
 def _moves(state: RigState) -> list[Operator]:
-    chips = np.ones((len(state.placed.axes), 1))
+    chips = np.ones((len(state.on_table.axes), 1))
     return [_operator(*_of_moved(state, chips * unit)) for unit in np.eye(3)]
 
 
 def _leans(state: RigState) -> list[Operator]:
-    axes, places, spin = state.placed.axes, state.placed.places, state.spin
+    axes, places, spin = state.on_table.axes, state.on_table.places, state.spin
     across = _across(places)
     inward = _across(across)
-    gravity = _turned_back(state, state.placed.gravity)
+    gravity = _turned_back(state, state.on_table.gravity)
     operators = []
     for unit in np.eye(3)[:2]:
         of_value, of_rate, of_acceleration = _of_moved(state, np.cross(unit, places))
@@ -195,20 +215,24 @@ def _leans(state: RigState) -> list[Operator]:
 
 
 def _stretches(state: RigState) -> list[Operator]:
-    return [_operator(*_of_moved(state, state.placed.places * [1.0, 1.0, 0.0]))]
+    return [_operator(*_of_moved(state, state.on_table.places * [1.0, 1.0, 0.0]))]
 
 
 def _shakes(state: RigState) -> list[Operator]:
-    return [Operator(_observed(_turned_back(state, unit) @ state.placed.axes.T)) for unit in np.eye(3)]
+    return [Operator(_observed(_turned_back(state, unit) @ state.on_table.axes.T)) for unit in np.eye(3)]
+
+
+def _heaves(state: RigState) -> list[Operator]:
+    return _shakes(state)[2:]
 
 
 def _vibrates(state: RigState) -> list[Operator]:
-    return [Operator(_observed(np.tile(state.placed.axes @ unit, (len(state.t), 1)))) for unit in np.eye(3)]
+    return [Operator(_observed(np.tile(state.on_table.axes @ unit, (len(state.t), 1)))) for unit in np.eye(3)]
 
 
 def _tilts(state: RigState) -> list[Operator]:
-    axes, places = state.placed.axes, state.placed.places
-    gravity, across = _turned_back(state, state.placed.gravity), _across(places)
+    axes, places = state.on_table.axes, state.on_table.places
+    gravity, across = _turned_back(state, state.on_table.gravity), _across(places)
     operators = []
     for unit in np.eye(3)[:2]:
         turned = _turned_back(state, unit)
@@ -245,8 +269,8 @@ def _delay(groups: _Groups, state: RigState) -> list[Operator]:
 
 
 _CHANNEL_KINDS: dict[str, tuple[str, str, float, Callable[[_Groups, RigState], Sequence[Operator]]]] = {
-    "offset": ("the offset of {} changes", "m/s²", LOCATED.shakes_m_s2, _offset),
-    "gain": ("the gain of {} changes", "1", LOCATED.ratio, _gain),
-    "delay": ("the sampling of {} is late", "s", LOCATED.late_s, _delay),
+    "offset": ("the offset of {} changes", "m/s²", USUAL.shakes_m_s2, _offset),
+    "gain": ("the gain of {} changes", "1", USUAL.ratio, _gain),
+    "delay": ("the sampling of {} is late", "s", USUAL.late_s, _delay),
 }
 """Errors of channels: words, unit, usual size, operators."""

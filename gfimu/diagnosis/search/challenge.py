@@ -1,0 +1,206 @@
+"""`challenge`: named causes against located terms: beside them, and instead of each of them or of all.
+
+Every set is compared under the noise and the roughness that it leaves. A located term that makes the data more
+probable joins the set, or takes the place of a named cause; what comes close without winning is a rival.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gfimu.diagnosis.data.body.stretch import BodyStretch
+from gfimu.diagnosis.data.stretch import Stretch
+from gfimu.diagnosis.fit.gauss_newton import FEW, Fit, fit
+from gfimu.diagnosis.fit.learn import learn_noise, learn_roughness
+from gfimu.diagnosis.fit.linear import Point, with_residue
+from gfimu.diagnosis.policy import Policy
+from gfimu.diagnosis.search.explain import Explanation, explained
+from gfimu.diagnosis.search.located_screen import Leader, LocatedScreen
+from gfimu.diagnosis.search.long_run import spread_over_runs
+from gfimu.diagnosis.search.sets import Key, Sets, prune
+from gfimu.diagnosis.terms.located.policy import LOCATED
+from gfimu.diagnosis.terms.located.term import LocatedTerm, is_located
+
+__all__ = ["Challenged", "challenge", "challenged"]
+
+
+@dataclass(frozen=True)
+class Challenged:
+    """What a set of causes became when located terms were compared with it.
+
+    Parameters
+    ----------
+    stretches : tuple of Stretch
+        The data.
+    best : Fit
+        The most probable set, under the noise that it leaves.
+    rivals : tuple of Fit
+        Other sets with located terms, each under its own noise, best first.
+    """
+
+    stretches: tuple[Stretch, ...]
+    best: Fit
+    rivals: tuple[Fit, ...]
+
+
+def challenged(explanation: Explanation, policy: Policy) -> Explanation:
+    """Return an explanation with located terms beside its named causes, or instead of them, where these win.
+
+    Terms are searched in some stretches, up to so many samples of each, and fitted to all.
+
+    Parameters
+    ----------
+    explanation : Explanation
+        What the search of the library ended with. One of a free body stays as it is.
+    policy : Policy
+        Thresholds of `challenge`.
+    """
+    stretches, best = explanation.stretches, explanation.best
+    if isinstance(stretches[0], BodyStretch):
+        return explanation
+    chosen = spread_over_runs([stretch.index for stretch in stretches], LOCATED.stretches)
+    some = [stretches[place] for place in chosen]
+    some = [replace(one, run=one.run.rows(0, min(len(one.run.t), LOCATED.samples))) for one in some]
+    found = challenge(some, _of_part(some, chosen, best.point), policy)
+    if not any(map(is_located, found.best.causes)):
+        others = [
+            replace(one, log_posterior=best.log_posterior + _gains(one, found.best))
+            for one in found.rivals
+            if one.key != best.key
+        ]
+        rivals = sorted((*explanation.rivals, *others), key=lambda one: -one.log_posterior)
+        return replace(explanation, rivals=tuple(rivals))
+    point = replace(best.point, causes=found.best.causes)
+    if best.point.residue is not None:
+        point = with_residue(stretches, point, best.point.residue.scale)
+    sets = Sets(stretches, learn_noise(stretches, learn_roughness(stretches, point)), policy)
+    whole = sets.fit([sets.base])[0]
+    if whole is None:
+        return explanation
+    sets.without_each(whole)
+    sets.fit([replace(whole.point, causes=one.causes) for one in found.rivals[: policy.beam]])
+    return replace(
+        explained(sets, prune(sets), explanation.fits, explanation.screening), elsewhere=explanation.elsewhere
+    )
+
+
+def _of_part(stretches: Sequence[Stretch], chosen: Sequence[int], point: Point) -> Point:
+    """Return a point of some stretches, which may be shorter than they were."""
+    part = replace(
+        point,
+        drives=tuple(point.drives[place] for place in chosen),
+        levels=tuple(point.levels[place] for place in chosen),
+        residue=None,
+    )
+    return part if point.residue is None else with_residue(stretches, part, point.residue.scale)
+
+
+def challenge(stretches: Sequence[Stretch], point: Point, policy: Policy) -> Challenged:
+    """Compare a set of causes with located terms beside it and instead of its members.
+
+    Parameters
+    ----------
+    stretches : sequence of Stretch
+        The data of a table.
+    point : Point
+        The set at its optimum, with the noise that it leaves.
+    policy : Policy
+        Thresholds ``cause_odds``, ``extra_odds``, ``close``, ``inexactness`` and ``worth_a_search``.
+    """
+    few = replace(policy, steps=FEW)
+    best, nothing = fit(stretches, point, few), fit(stretches, replace(point, causes=()), few)
+    settled = {best.key: _settled(stretches, best, policy)}
+    leading = settled[best.key]
+    for _ in range(LOCATED.terms):
+        removed = max(nothing.objective - leading.objective, 0.0)
+        needed = max(policy.extra_odds, policy.inexactness * removed) if leading.causes else policy.cause_odds
+        fewer = _fewer(stretches, leading, policy)
+        tried = _tried(stretches, leading, fewer, needed, policy)
+        for one in tried:
+            if one.key not in settled:
+                try:
+                    settled[one.key] = _settled(stretches, _refined(stretches, one, policy), policy)
+                except np.linalg.LinAlgError:  # what would be learnt leaves nothing that can be solved
+                    continue
+        grown = [one for one in settled.values() if one.key > leading.key and _gains(one, leading) > needed]
+        others = [one for one in settled.values() if not one.key >= leading.key and _gains(one, leading) > 0.0]
+        if not grown and not others:
+            break
+        leading = max((*grown, *others), key=lambda one: one.log_posterior)
+    rivals = sorted((one for one in settled.values() if one is not leading), key=lambda one: -one.log_posterior)
+    return Challenged(tuple(stretches), leading, tuple(rivals))
+
+
+def _gains(one: Fit, other: Fit) -> float:
+    return one.log_posterior - other.log_posterior
+
+
+def _fewer(stretches: Sequence[Stretch], found: Fit, policy: Policy) -> list[Fit]:
+    """Return a set without each of its named causes, and without all of these, under its noise."""
+    named = [cause for cause in found.causes if not is_located(cause)]
+    sets = [tuple(other for other in found.causes if other is not cause) for cause in named]
+    if len(named) > 1:
+        sets.append(tuple(filter(is_located, found.causes)))
+    few = replace(policy, steps=FEW)
+    return [fit(stretches, replace(found.point, causes=causes), few) for causes in sets]
+
+
+def _tried(
+    stretches: Sequence[Stretch], leading: Fit, fewer: Sequence[Fit], needed: float, policy: Policy
+) -> list[Fit]:
+    """Return fits of a set with located terms, beside it or instead of some of its causes, best first."""
+    cases: list[tuple[Key, float]] = [(frozenset(), needed - policy.worth_a_search)]
+    cases += [(leading.key - one.key, _gains(leading, one) - policy.close) for one in fewer]
+    screen = LocatedScreen(stretches, leading.point)
+    promised = [
+        (base.log_posterior + leader.log_odds, leader, base)
+        for base, leaders in zip((leading, *fewer), screen.leaders_each(cases), strict=True)
+        for leader in _distinct(leaders)
+    ]
+    promised.sort(key=lambda one: -one[0])
+    fitted: list[Fit] = []
+    for _, leader, base in promised[: LOCATED.fitted]:
+        cause = screen.refined(leader, leading.key - base.key).cause
+        fitted += _fitted(stretches, replace(base.point, causes=(*base.causes, cause)), policy)
+    fitted.sort(key=lambda one: -one.log_posterior)
+    return fitted[: LOCATED.compared]
+
+
+def _fitted(stretches: Sequence[Stretch], point: Point, policy: Policy) -> list[Fit]:
+    try:
+        found = fit(stretches, point, replace(policy, steps=FEW))
+    except np.linalg.LinAlgError:  # a term that can't be solved for describes nothing
+        return []
+    return [found] if np.isfinite(found.log_posterior) else []
+
+
+def _refined(stretches: Sequence[Stretch], found: Fit, policy: Policy) -> Fit:
+    """Return a fit whose last term has the most probable frequency, damping or order about it."""
+    *others, last = found.causes
+    if not isinstance(last.family, LocatedTerm) or not last.family.dependence.near(1.0):
+        return found
+    screen = LocatedScreen(stretches, found.point)
+    leader = screen.refined(Leader(-np.inf, last.family, last), frozenset({last.key}))
+    again = _fitted(stretches, replace(found.point, causes=(*others, leader.cause)), policy)
+    return max([found, *again], key=lambda one: one.log_posterior)
+
+
+def _settled(stretches: Sequence[Stretch], found: Fit, policy: Policy) -> Fit:
+    """Return a fit under the roughness and the noise that it leaves."""
+    point = learn_noise(stretches, learn_roughness(stretches, found.point))
+    return fit(stretches, point, replace(policy, steps=FEW))
+
+
+def _distinct(leaders: Sequence[Leader]) -> list[Leader]:
+    """Return the leaders that differ in place, pattern or kind of dependence, and are not far behind."""
+    found: dict[tuple[str, ...], Leader] = {}
+    for leader in leaders:
+        where, dependence = leader.term.where, leader.term.dependence
+        best = leaders[0].log_odds
+        if leader.log_odds < min(best - LOCATED.behind, 0.5 * best) or len(found) == LOCATED.fitted:
+            break
+        found.setdefault((where.name, where.what, leader.term.pattern, dependence.kind), leader)
+    return list(found.values())

@@ -1,0 +1,1 @@
+"""Described errors: unknown functions at places of the forward model, added to what a simulation predicts."""
