@@ -73,12 +73,7 @@ EFFECTS: dict[str, type[Effect]] = {
 }
 """Every effect of a rig on its table in the contract's first table, by its name there."""
 
-_OF_RIG: tuple[type[Effect], ...] = (
-    *(rig.TachoLag, body.ChipDelay, rig.ChipLag, rig.BearingShake, rig.BenchSway),
-    drifting.ColdStart,
-)
-
-FURTHER_EFFECTS: dict[str, type[Effect]] = {effect.name: effect for effect in _OF_RIG}
+FURTHER_EFFECTS: dict[str, type[Effect]] = {one.name: one for one in (rig.TachoLag, body.ChipDelay, rig.ChipLag)}
 """What a rig on its table may have besides, by names that the first table of the contract has not."""
 
 INCLINED_EFFECTS: dict[str, type[Effect]] = {timing.AngleZero.name: timing.AngleZero}
@@ -120,10 +115,7 @@ NOT_OF_A_CARRIAGE: dict[str, str] = {
     ),
     "mount_tilt": "the array may be turned about all three axes: mount_turn",
     "tacho_scale": "steps are counted, and the pitch of belt or screw is known better than the gain of a chip",
-    **dict.fromkeys(
-        (one.name for one in _OF_RIG if one.name not in ("chip_delay", "chip_lag", "cold_start")),
-        "an effect of a table that turns",
-    ),
+    **dict.fromkeys(("tacho_lag", "bearing_shake", "bench_sway"), "an effect of a table that turns"),
 }
 """Effects that a diagnosis of a linear axis does not look for, and why."""
 
@@ -136,8 +128,11 @@ CARRIAGE_EFFECTS: dict[str, type[Effect]] = {
 TABLE_EFFECTS: dict[str, type[Effect]] = EFFECTS | FURTHER_EFFECTS
 """Every effect of a rig on its table whose reference is a rate."""
 
-SIMULATED_EFFECTS: dict[str, type[Effect]] = {chain.ProofMass.name: chain.ProofMass}
-"""What scenarios and twins may have and no diagnosis looks for, as the usual effects hold its limit."""
+SIMULATED_EFFECTS: dict[str, type[Effect]] = {
+    one.name: one for one in (chain.ProofMass, rig.BearingShake, rig.BenchSway, drifting.ColdStart)
+}
+"""What scenarios and twins may have and no diagnosis looks for: the usual effects hold its limit, or functions at
+places describe it."""
 
 ENCODER_EFFECTS: dict[str, type[Effect]] = {
     name: effect for name, effect in TABLE_EFFECTS.items() if name not in NOT_OF_AN_ENCODER

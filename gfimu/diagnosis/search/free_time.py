@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.diagnosis.data.cosine_basis import NoiseLevels
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.gauss_newton import FEW, fit
 from gfimu.diagnosis.fit.linear import Point, linearise
@@ -50,9 +51,10 @@ class FreeTime:
 def free_time(stretches: Sequence[Stretch], point: Point, policy: Policy) -> list[FreeTime]:
     """Return the places of errors that are free in time beside the causes of a point, best first.
 
-    The noise is the one to begin with, as learnt noise would take in what is looked for.
+    The noise is the learnt one, but with the same slow noise in all channels, as that of one channel would take in what
+    is looked for.
     """
-    levels = tuple(stretch.first_levels for stretch in stretches)
+    levels = tuple(map(_alike, point.levels))
     point = fit(stretches, replace(point, levels=levels), replace(policy, steps=FEW)).point
     totals: dict[str, FreeTime] = {}
     for index, posterior in enumerate(linearise(stretches, point, responses=False).posteriors):
@@ -69,6 +71,13 @@ def free_time(stretches: Sequence[Stretch], point: Point, policy: Policy) -> lis
             before = totals[label].log_odds if label in totals else 0.0
             totals[label] = FreeTime(before + value, where, pattern)
     return sorted(totals.values(), key=lambda one: -one.log_odds)
+
+
+def _alike(levels: NoiseLevels) -> NoiseLevels:
+    """Return noise levels whose bias instability is the median of the channels."""
+    flicker = np.full_like(levels.flicker, np.median(levels.flicker[:-1]))
+    flicker[-1] = levels.flicker[-1]
+    return replace(levels, flicker=flicker)
 
 
 def _directions(stretch: Stretch, point: Point, index: int) -> Iterator[tuple[Place, str, list[_Floats]]]:

@@ -116,12 +116,10 @@ def _place(what: str, name: str, series: Sequence[str], array: AccelerometerArra
     places = rig_places(is_angle=is_angle)
     if what in places:
         return places[what]
-    chips = {chip.name: index for index, chip in enumerate(array.chips)}
-    groups = []
-    for one in series:
-        members = np.flatnonzero(array.chip_of_channel == chips[one]) if one in chips else [array.channels.index(one)]
-        groups.append(tuple(int(channel) for channel in members))
-    return channel_place(name, what, tuple(groups), series)
+    members: dict[str, tuple[int, ...]] = {channel: (index,) for index, channel in enumerate(array.channels)}
+    for index, chip in enumerate(array.chips):
+        members[chip.name] = tuple(np.flatnonzero(array.chip_of_channel == index).tolist())
+    return channel_place(name, what, tuple(members[one] for one in series), series)
 
 
 def derivatives(operator: Operator, values: _Floats, period: float) -> list[_Floats]:

@@ -4,18 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from no_name import Bent, Leaning, Sagging
 
 from gfimu import AccelerometerArray
-from gfimu.diagnosis import (
-    LocatedEffect,
-    LocatedTerm,
-    RigState,
-    Wave,
-    channel_place,
-    dependences,
-    located_columns,
-    rig_places,
-)
+
+from gfimu.diagnosis import LocatedTerm, dependences, located_columns
+from gfimu.model import LocatedEffect, RigState, Wave, channel_place, rig_places
 from sim.effects import make_effect
 from sim.trials import random_profile
 from sim.twin import Twin
@@ -30,22 +24,29 @@ EVERY = dependences([STATE])
 PLACES = rig_places(is_angle=False)
 FASTEST, STEEPEST = np.abs(STATE.spin.rate).max(), np.abs(STATE.spin.acceleration).max()
 
+def named(name, **parameters):
+    return make_effect(name, parameters, ARRAY)
+
+
 IN_THE_RIG = {
-    "leans with rate²": ("omega^2", 0, FASTEST**2, "lean_by_rate_squared", {"x_rad_per_rad2_s2": 1e-6}),
-    "leans with α": ("alpha", 1, STEEPEST, "lean_by_acceleration", {"y_rad_per_rad_s2": 1e-6}),
-    "moves": ("1", 0, 1.0, "eccentricity", {"x_m": 1e-4}),
-    "tilts": ("1", 1, 1.0, "table_tilt", {"y_rad": 1e-4}),
-    "gain": ("|omega|", 0, FASTEST, "gain_by_speed", {"ratio_per_rad_s": 1e-5}),
-    "reads": ("omega^3", 0, FASTEST**3, "reference_rate_cubed", {"error_rad_s_per_rad3_s3": 1e-5}),
-    "late": ("1", 0, 1.0, "tacho_latency", {"delay_s": 1e-3}),
+    "leans with rate²": ("omega^2", 0, FASTEST**2 * 1e-6, Leaning([1e-6, 0.0, 0.0], lambda spin: spin.rate**2)),
+    "leans with α": ("alpha", 1, STEEPEST * 1e-6, Leaning([0.0, 1e-6, 0.0], lambda spin: spin.acceleration)),
+    "moves": ("1", 0, 1e-4, named("eccentricity", x_m=1e-4)),
+    "tilts": ("1", 1, 1e-4, named("table_tilt", y_rad=1e-4)),
+    "gain": ("|omega|", 0, FASTEST * 1e-5, Sagging(1e-5, lambda spin: np.abs(spin.rate))),
+    "reads": ("omega^3", 0, FASTEST**3 * 1e-5, Bent(1e-5, lambda spin: spin.rate**3)),
+    "late": ("1", 0, 1e-3, named("tacho_latency", delay_s=1e-3)),
 }
 
 
-def change(name, parameters):
+def change(effect):
     """What an effect of the simulation changes, (n, c + 1)."""
-    effect = make_effect(name, parameters, ARRAY)
     before, after = (TWIN.predict(MOTION, T, temperature=WARM, effects=some) for some in ([], [effect]))
     return np.column_stack([after[0] - before[0], after[1] - before[1]])
+
+
+def effect_of(term, coefficients):
+    return LocatedEffect(term.where, term.dependence, term.pattern, coefficients)
 
 
 def near(first_order, exact):
@@ -57,12 +58,11 @@ def near(first_order, exact):
 
 @pytest.mark.parametrize("case", IN_THE_RIG)
 def test_a_place_in_the_rig_changes_what_the_exact_effect_changes(case):
-    dependence, component, scale, name, parameters = IN_THE_RIG[case]
+    dependence, component, size, effect = IN_THE_RIG[case]
     term = LocatedTerm(PLACES[case.split(" ")[0]], EVERY[dependence])
     coefficients = np.zeros(term.count)
-    coefficients[component] = scale * next(iter(parameters.values()))
-    exact = change(name, parameters)
-    assert near(LocatedEffect(term, coefficients).added(STATE), exact) < 0.02
+    coefficients[component] = size
+    assert near(effect_of(term, coefficients).added(STATE), change(effect)) < 0.02
 
 
 @pytest.mark.parametrize(
@@ -76,7 +76,7 @@ def test_a_place_in_the_rig_changes_what_the_exact_effect_changes(case):
 def test_an_error_of_channels_changes_what_the_exact_effect_changes(kind, dependence, groups, name, parameters):
     term = LocatedTerm(channel_place("channel", kind, groups, ["a22"]), EVERY[dependence], "one")
     coefficients = np.array([next(iter(parameters.values()))])
-    assert near(LocatedEffect(term, coefficients).added(STATE), change(name, parameters)) < 0.02
+    assert near(effect_of(term, coefficients).added(STATE), change(named(name, **parameters))) < 0.02
 
 
 def test_an_array_stretches_as_one_with_longer_arms():
@@ -84,7 +84,7 @@ def test_an_array_stretches_as_one_with_longer_arms():
     places = ARRAY.chip_positions * [1.0 + longer, 1.0 + longer, 1.0]
     stretched = TWIN.with_array(ARRAY.with_geometry(places, [chip.axes for chip in ARRAY.chips]))
     exact = stretched.predict(MOTION, T, temperature=WARM)[0] - STATE.readings
-    added = LocatedEffect(LocatedTerm(PLACES["stretches"], EVERY["1"]), np.array([longer])).added(STATE)
+    added = effect_of(LocatedTerm(PLACES["stretches"], EVERY["1"]), np.array([longer])).added(STATE)
     assert near(added[:, :-1], exact) < 0.02
 
 
@@ -92,9 +92,9 @@ def test_a_leaning_array_is_one_that_is_tilted_and_moved():
     """The simulation tilts an array about its own centre; it leans about the foot of it."""
     tilt = 1e-4
     height = float(TWIN.cube_offset[2])
-    leans = LocatedEffect(LocatedTerm(PLACES["leans"], EVERY["1"]), np.array([0.0, tilt])).added(STATE)
-    moves = LocatedEffect(LocatedTerm(PLACES["moves"], EVERY["1"]), np.array([-tilt * height, 0.0, 0.0])).added(STATE)
-    assert near(leans + moves, change("mount_tilt", {"y_rad": tilt})) < 0.02
+    leans = effect_of(LocatedTerm(PLACES["leans"], EVERY["1"]), np.array([0.0, tilt])).added(STATE)
+    moves = effect_of(LocatedTerm(PLACES["moves"], EVERY["1"]), np.array([-tilt * height, 0.0, 0.0])).added(STATE)
+    assert near(leans + moves, change(named("mount_tilt", y_rad=tilt))) < 0.02
 
 
 @pytest.mark.parametrize("place", PLACES)
@@ -104,17 +104,17 @@ def test_columns_are_the_derivative_by_the_coefficients(place, dependence):
     columns = located_columns(term, STATE, np.ones((len(T), 13)))
     rng = np.random.default_rng(3)
     sizes = rng.standard_normal(term.count)
-    added = LocatedEffect(term, term.where.usual * sizes).added(STATE)
+    added = effect_of(term, term.where.usual * sizes).added(STATE)
     np.testing.assert_allclose(columns.times(sizes), added, rtol=0, atol=1e-9 * np.abs(added).max())
 
 
 def test_a_bench_shakes_as_the_exact_effect_does():
     amplitude, cycles = 1e-3, 7.3
-    exact = change("bearing_shake", {"amplitude_m_s2_per_rad_s": amplitude, "order": cycles, "phase_rad": 0.0})
+    exact = change(named("bearing_shake", amplitude_m_s2_per_rad_s=amplitude, order=cycles, phase_rad=0.0))
     term = LocatedTerm(PLACES["shakes"], Wave(cycles, 0.1, fastest=1.0))
     coefficients = np.zeros(term.count)
     coefficients[-1] = amplitude  # the sine along the vertical
-    assert near(LocatedEffect(term, coefficients).added(STATE), exact) < 1e-9
+    assert near(effect_of(term, coefficients).added(STATE), exact) < 1e-9
 
 
 def test_an_array_vibrates_as_a_bench_does_whose_direction_turns_with_the_table():
