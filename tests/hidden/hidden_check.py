@@ -45,13 +45,14 @@ def diagnosed(row: Hidden, *, without: Collection[str] = ()) -> Diagnosis:
 
 def problems(row: Hidden, found: Diagnosis) -> list[str]:
     """Return what is wrong in the diagnosis of a row; empty where it is right."""
-    named = {cause.effect for cause in found.causes}
+    named = {cause.effect if cause.unlisted is None else cause.unlisted.place for cause in found.causes}
     said = f"{found.verdict} {' + '.join(sorted(named))}; {found.unexplained.signature}"
     if not row.names:
         right = found.verdict == "nothing_found" and not named
         return [] if right else [f"nothing is hidden, reported {said}"]
     if row.outside:
-        right = (found.verdict == "unknown" and not named) or (named and named <= set(row.or_else.split()))
+        right = (found.verdict == "unknown" and not named and not row.or_else) or named <= set(row.or_else.split())
+        right = right and bool(named or not row.or_else)
         return [] if right else [f"{row.effects} is in no library, reported {said}"]
     apart = row.names <= named <= row.names | set(row.or_else.split())
     verdict = "explained" if named == row.names else "ambiguous"

@@ -13,9 +13,15 @@ _PAIRS = (
     *("hysteresis+table_tilt", "gain_drift+sensor_position", "quadratic+dropped_frames", "cogging+tacho_scale"),
     *("vibration_rectification+stuck_channel", "warm_up+axis_swap"),
 )
-_TAKEN_OUT = (
-    *("table_tilt", "axis_wobble", "channel_skew", "clock_error", "tacho_ripple", "interference_tone", "cogging"),
-)
+_TAKEN_OUT = {
+    "table_tilt": "bench",
+    "axis_wobble": "bench",
+    "channel_skew": "clock",
+    "clock_error": "clock",
+    "tacho_ripple": "reference",
+    "interference_tone": "supply channel",
+    "cogging": "motion",
+}
 _BODY = (
     *("bias", "scale_factor", "sensor_position", "misalignment", "chip_delay", "channel_skew", "gyro_latency"),
     *("gyro_scale", "gyro_misalignment", "quadratic", "axis_swap", "sign_flip", "wrong_range"),
@@ -40,18 +46,18 @@ SINGLES = [
 PAIRS = [Hidden(names, _generator(number + 1), 300 + number) for number, names in enumerate(_PAIRS)]
 
 OUTSIDE = [
-    Hidden("stick_slip", "independent", 401, 600.0),
-    Hidden("cubic_channel", "independent", 402, 600.0, or_else="cubic", why=PLACE),
-    Hidden("square_wave", "independent", 405, 600.0),
-    Hidden("magnetic_pickup", "independent", 406, 600.0),
-    Hidden("backlash", "independent", 407, 600.0),
+    Hidden("stick_slip", "independent", 401, 600.0, or_else="motion", why=PLACE),
+    Hidden("cubic_channel", "independent", 402, 600.0, or_else="channel", why=PLACE),
+    Hidden("square_wave", "independent", 405, 600.0, or_else="supply channel", why=PLACE),
+    Hidden("magnetic_pickup", "independent", 406, 600.0, or_else="channel", why=PLACE),
+    Hidden("backlash", "independent", 407, 600.0, or_else="motion", why=PLACE),
 ]
 
 TAKEN_OUT = [
-    Hidden(name, _generator(number), 420 + number, 600.0, setting={"without": name})
-    for number, name in enumerate(_TAKEN_OUT)
+    Hidden(name, _generator(number), 420 + number, 600.0, or_else=place, why=PLACE, setting={"without": name})
+    for number, (name, place) in enumerate(_TAKEN_OUT.items())
 ]
-"""Effects that are taken out of the library: `unknown`, as what another effect could take their place for is known."""
+"""Effects that are taken out of the library: the place that they have is what can be said."""
 
 NULLS = [
     Hidden("", generator, 200 + number, seconds=setting.pop("seconds", 12.0), setting=setting)

@@ -50,7 +50,7 @@ class Hidden:
         Length of the recording.
     or_else : str
         Further names, separated by spaces, in a set that these data can't separate. For what no library holds: the
-        point of the grammar that it is.
+        places, as ``verdict.json`` has them, or the name that is right.
     why : str
         Why the data can't tell them apart, or why the row departs from the others.
     setting : mapping
@@ -89,7 +89,7 @@ class Hidden:
 
 
 CONSTANT = "gravity is all that this channel sees in an upright run: an offset, a gain and a curvature read alike"
-PLACE = "a term of the wider library with this place and dependence"
+PLACE = "its place is what a diagnosis can say of what has no name"
 
 ONCE = [
     Hidden("bias", "campaign", 1),
@@ -167,14 +167,14 @@ NULLS = [
 """Nothing hidden: weak and strong bias instability, slow samples, a noisy tachometer, an encoder."""
 
 OUTSIDE = [
-    Hidden("tone_on_one_channel", "independent", 403, 600.0, 8.0),
-    Hidden("bias_jump", "independent", 404, 600.0, 8.0),
-    Hidden("lean_with_rate", "foreign", 411, 500.0, or_else="lean_by_rate_squared", why=PLACE),
-    Hidden("tacho_asymmetry", "foreign", 413, 500.0, or_else="reference_by_direction", why=PLACE),
-    Hidden("rate_offsets", "foreign", 414, 500.0, or_else="offset_by_speed", why=PLACE),
-    Hidden("late_chip", "foreign", 415, 500.0, or_else="chip_delay", why=PLACE),
+    Hidden("tone_on_one_channel", "independent", 403, 600.0, 8.0, or_else="channel", why=PLACE),
+    Hidden("bias_jump", "independent", 404, 600.0, 8.0, or_else="channel", why=PLACE),
+    Hidden("lean_with_rate", "foreign", 411, 500.0, or_else="array", why=PLACE),
+    Hidden("tacho_asymmetry", "foreign", 413, 500.0, or_else="reference", why=PLACE),
+    Hidden("rate_offsets", "foreign", 414, 500.0, or_else="channel", why=PLACE),
+    Hidden("late_chip", "foreign", 415, 500.0, or_else="chip_delay clock", why=PLACE),
 ]
-"""What has no name in the contract: `unknown`, or the term that says its place and dependence, and no other name."""
+"""What has no name in the contract: its place, and no other name."""
 
 BODIES = [
     Hidden("sensor_position", "body", 501, seconds=8.0),

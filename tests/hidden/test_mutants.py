@@ -15,7 +15,7 @@ from hidden_table import ROWS, row_of
 from sim.effects import EFFECTS, TABLE_EFFECTS
 from sim.twin import Twin
 
-ENGINE = sys.modules["gfimu.diagnosis.one_library"]
+ENGINE = sys.modules["gfimu.diagnosis.steps"]
 
 
 def without_but(*few):
@@ -76,8 +76,8 @@ def residuals_unjudged(patch):
     """Whatever is left, the best set of names is believed; only the gate may withdraw it."""
     patch.setattr(ENGINE, "is_unknown", lambda *_: False)
     patch.setattr(ENGINE, "is_dominant", lambda *_: False)
-    patch.setattr(ENGINE, "coincidences", lambda *_: [])
-    kept = ENGINE.LibraryDiagnosis
+    patch.setattr(ENGINE, "challenged", lambda explanation, _: explanation)
+    kept = ENGINE.Steps
     patch.setattr(kept, "_apart_from_the_rest", lambda self, found: (found, self._left(found.explanation)))
 
 

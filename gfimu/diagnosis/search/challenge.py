@@ -164,9 +164,16 @@ def _tried(
     fitted: list[Fit] = []
     for _, leader, base in promised[: LOCATED.fitted]:
         cause = screen.refined(leader, leading.key - base.key).cause
-        fitted += _fitted(stretches, replace(base.point, causes=(*base.causes, cause)), policy)
+        tried = _fitted(stretches, replace(base.point, causes=(*base.causes, cause)), policy)
+        fitted += [one for one in tried if base is leading or _says_more(one, leading, policy)]
     fitted.sort(key=lambda one: -one.log_posterior)
     return fitted[: LOCATED.compared]
+
+
+def _says_more(one: Fit, leading: Fit, policy: Policy) -> bool:
+    """Whether a set fits better than a leading one or needs fewer numbers; otherwise it is the same without a name."""
+    count, most = (sum(len(cause.coordinates) for cause in fit.causes) for fit in (one, leading))
+    return count < most or one.objective < leading.objective - 2.0 * policy.cause_odds
 
 
 def _fitted(stretches: Sequence[Stretch], point: Point, policy: Policy) -> list[Fit]:

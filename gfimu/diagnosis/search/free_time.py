@@ -54,7 +54,7 @@ def free_time(stretches: Sequence[Stretch], point: Point, policy: Policy) -> lis
     The noise is the learnt one, but with the same slow noise in all channels, as that of one channel would take in what
     is looked for.
     """
-    levels = tuple(map(_alike, point.levels))
+    levels = tuple(_alike(one, policy.largest_flicker) for one in point.levels)
     point = fit(stretches, replace(point, levels=levels), replace(policy, steps=FEW)).point
     totals: dict[str, FreeTime] = {}
     for index, posterior in enumerate(linearise(stretches, point, responses=False).posteriors):
@@ -73,9 +73,9 @@ def free_time(stretches: Sequence[Stretch], point: Point, policy: Policy) -> lis
     return sorted(totals.values(), key=lambda one: -one.log_odds)
 
 
-def _alike(levels: NoiseLevels) -> NoiseLevels:
-    """Return noise levels whose bias instability is the median of the channels."""
-    flicker = np.full_like(levels.flicker, np.median(levels.flicker[:-1]))
+def _alike(levels: NoiseLevels, largest: float) -> NoiseLevels:
+    """Return noise levels whose bias instability is the median of the channels, up to a largest usual one, m/s²."""
+    flicker = np.full_like(levels.flicker, min(float(np.median(levels.flicker[:-1])), largest))
     flicker[-1] = levels.flicker[-1]
     return replace(levels, flicker=flicker)
 

@@ -209,7 +209,8 @@ def conclude(
     ]
     rivals = conflicting(explanation, policy)
     named = named_causes(explanation, explanation.best, policy, left)
-    believed = explanation.nothing if refuted or (unknown and left.free) else explanation.best
+    described = bool(named) and all(map(is_located, explanation.best.causes)) and not (refuted or left.free)
+    believed = explanation.best if described or not unknown else explanation.nothing
     loudest = loudest_channel(explanation.stretches, believed.point, policy)
     apart = stands_out(explanation, left, policy)
     runs = run_views(prepared, explanation.stretches, believed)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from types import FunctionType
-from typing import Annotated
+from typing import Annotated, Any
 
 from gfimu.base.errors import InputError, check_name, naming
 from gfimu.base.files.input_file import is_ordinary
@@ -30,7 +30,7 @@ class RigEffect(Table, frozen=True):
     """A cause that the simulation has."""
 
     name: Annotated[str, about("Name of the cause.")]
-    parameters: Annotated[dict[str, float | str], about("Its parameters by key.")] = {}  # noqa: RUF012  of msgspec
+    parameters: Annotated[dict[str, Any], about("Its parameters by key.")] = {}  # noqa: RUF012  of msgspec
 
 
 class RigFile(Table, frozen=True):

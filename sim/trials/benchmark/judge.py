@@ -23,7 +23,7 @@ from sim.trials.benchmark.judged import Judged
 from sim.trials.benchmark.real import beyond_stated, held_out_recording, prediction_error, real_task
 from sim.trials.benchmark.release import MEASURED, find_case
 from sim.trials.benchmark.truth_file import Fixed, fixed_world
-from sim.trials.benchmark.unlisted import PLACES_OF_LISTED, SAME_PLACE
+from sim.trials.benchmark.unlisted import GOES_WITH, PLACES_OF_LISTED, SAME_PLACE, quantities_of
 from sim.trials.benchmark.world import FreshMotion, Truth
 from sim.trials.worlds.z_scores import z_scores
 
@@ -211,8 +211,9 @@ def _outcome_of_listed(truth: Truth, claims: Sequence[Claim]) -> str:
 def _outcome_of_unlisted(truth: Truth, claims: Sequence[Claim]) -> str:
     certain = True
     for claim in claims:
-        right = bool(claim.names & set(truth.right)) or any(_describes(cause, truth) for cause in claim.causes)
-        if not right and not claim.names & set(truth.near):
+        placed = [cause for cause in claim.causes if _describes(cause, truth)]
+        right = bool(claim.names & set(truth.right)) or any(_goes_with(cause, truth) for cause in placed)
+        if not right and not placed and not claim.names & set(truth.near):
             return "wrong"
         certain = certain and right and len(claim.names) == 1
     return "alone" if certain else "set"
@@ -221,6 +222,12 @@ def _outcome_of_unlisted(truth: Truth, claims: Sequence[Claim]) -> str:
 def _describes(cause: CauseAnswer, truth: Truth) -> bool:
     """Whether a cause describes what is hidden by its place; one that states a name is judged by that."""
     return cause.effect == _DESCRIBED and not cause.name and place_of(cause) == truth.place
+
+
+def _goes_with(cause: CauseAnswer, truth: Truth) -> bool:
+    """Whether a description goes with what is hidden; one that states no dependence is judged by its place alone."""
+    known = GOES_WITH.get(truth.hidden[0][0], ())
+    return not cause.dependence or not known or bool(quantities_of(cause.dependence) & set(known))
 
 
 def _scores(claims: Sequence[Claim], truth: Truth) -> list[float]:

@@ -1,7 +1,6 @@
 """A diagnosis that is interrupted, or out of time, gives what is known by then, and its workers end with it."""
 
 import time
-from importlib import import_module
 
 import numpy as np
 import pytest
@@ -20,7 +19,7 @@ RUN = measure(
     [make_effect("table_tilt", {"x_rad": 0.01, "y_rad": 0.0})],
     Measurement(duration=12.0),
 )
-STAGES = ["samples", "search", "lack of fit", "validation", "wider library", "place"]
+STAGES = ["samples", "search", "places", "validation"]
 
 
 def interrupting(text, *words):
@@ -38,7 +37,12 @@ def interrupting(text, *words):
 
 @pytest.mark.parametrize(
     ("text", "stage", "leads"),
-    [("drive", "search", False), ("leading", "search", True), ("hold out", "validation", True)],
+    [
+        ("drive", "search", False),
+        ("leading", "search", True),
+        ("places", "places", True),
+        ("hold out", "validation", True),
+    ],
 )
 def test_an_interrupt_gives_what_is_known(text, stage, leads):
     report, said = interrupting(text)
@@ -57,31 +61,6 @@ def test_an_interrupt_gives_what_is_known(text, stage, leads):
     expected = {"by": "Ctrl-C", "stage": stage, "done": STAGES[:place], "not_done": STAGES[place:]}
     assert found.to_dict()["interrupted"] == expected
     assert "--time-limit" in next_steps(found)[0]
-
-
-def test_a_verdict_stands_when_the_wider_library_is_interrupted(monkeypatch):
-    monkeypatch.setattr("gfimu.diagnosis.one_library.LibraryDiagnosis.promise", lambda *_: 100.0)
-    report, _ = interrupting("wider library", "SIGTERM")
-    found = diagnose([RUN], TWIN, report=report)
-    assert found.verdict == "explained"
-    assert [cause.effect for cause in found.causes] == ["table_tilt"]
-    assert found.to_dict()["interrupted"] == {
-        "by": "SIGTERM",
-        "stage": "wider library",
-        "done": STAGES[:-2],
-        "not_done": STAGES[-2:],
-    }
-    assert found.sentences[-1].endswith("Not done: wider library, place.")
-
-
-def test_a_verdict_stands_when_its_place_is_not_looked_for_any_more(monkeypatch):
-    def with_place(*_):
-        raise KeyboardInterrupt("time limit")
-
-    monkeypatch.setattr(import_module("gfimu.diagnosis.diagnose"), "with_place", with_place)
-    found = diagnose([RUN], TWIN)
-    assert found.verdict == "explained"
-    assert (found.interrupted.by, found.interrupted.not_done) == ("time limit", ("place",))
 
 
 @pytest.mark.parametrize("workers", [1, 2])

@@ -7,20 +7,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from made_diagnoses import made_diagnosis
-from usual_twin import UsualTwin
 
 from gfimu import AccelerometerArray, InputError
 from gfimu.diagnosis import diagnose, headline, report_html
 from gfimu.recording import Recording
 from sim.effects import make_effect
 from sim.trials import Measurement, draw_world, measure, random_profile, study_cases
+from sim.twin import Twin
 
 SETTING = Measurement(duration=24.0)
 
 
 @pytest.fixture(scope="module")
 def twin():
-    return UsualTwin(array=AccelerometerArray.load("cube12"), array_name="cube12")
+    return Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
 
 
 @pytest.mark.study

@@ -136,7 +136,7 @@ def test_no_exchange_of_a_member_betters_the_leader():
 def test_one_chip_has_no_hypothesis_without_a_size():
     """Delays between chips are none for one chip: such a pattern is no hypothesis, and the search goes on."""
     array = AccelerometerArray.load("one_adxl345")
-    twin = replace(TWIN, array=array, grammar=True)
+    twin = replace(TWIN, array=array)
     signatures = [
         Signature(family, {}, np.arange(count), 1.0)
         for family in twin.families().values()

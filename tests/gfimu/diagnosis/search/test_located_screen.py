@@ -12,15 +12,14 @@ from gfimu import AccelerometerArray
 from gfimu.diagnosis import (
     LOCATED,
     LocatedScreen,
-    Operator,
     Policy,
-    Wave,
     free_time,
     prepare,
     signal_of,
     starting_point,
     stretches_of,
 )
+from gfimu.model import USUAL, Operator, Wave
 from sim.trials import Measurement, measure
 from sim.twin import Twin
 
@@ -44,7 +43,8 @@ def humming():
 def test_a_tone_is_found_on_its_channel_to_a_tenth_of_what_can_be_separated(humming):
     stretches, point = humming
     leaders = LocatedScreen(stretches, point).leaders()
-    best = leaders[0].term
+    screen = LocatedScreen(stretches, point)
+    best = screen.refined(leaders[0]).term
     assert (best.where.components, best.dependence.kind) == (("a32",), "tone")
     assert best.dependence.cycles == pytest.approx(17.321, abs=0.1 / 20.0)
     odds = [leader.log_odds for leader in leaders]
@@ -55,7 +55,7 @@ def test_a_tone_is_found_on_its_channel_to_a_tenth_of_what_can_be_separated(humm
 def test_one_channel_of_twelve_and_a_wave_pay_for_having_been_chosen(humming):
     stretches, point = humming
     best = LocatedScreen(stretches, point).leaders()[0]
-    assert best.cause.log_prior == pytest.approx(LOCATED.log_prior - LOCATED.wave_looks - np.log(12.0))
+    assert best.cause.log_prior == pytest.approx(LOCATED.log_prior - USUAL.wave_looks - np.log(12.0))
 
 
 def test_a_channel_that_jumps_is_the_place_of_an_error_that_is_free_in_time():

@@ -7,7 +7,6 @@ import pytest
 from no_name import Bent, Leaning, Sagging
 
 from gfimu import AccelerometerArray
-
 from gfimu.diagnosis import LocatedTerm, dependences, located_columns
 from gfimu.model import LocatedEffect, RigState, Wave, channel_place, rig_places
 from sim.effects import make_effect
@@ -23,6 +22,7 @@ STATE = RigState(T, MOTION.at(T), TWIN.predict(MOTION, T, temperature=WARM)[0], 
 EVERY = dependences([STATE])
 PLACES = rig_places(is_angle=False)
 FASTEST, STEEPEST = np.abs(STATE.spin.rate).max(), np.abs(STATE.spin.acceleration).max()
+
 
 def named(name, **parameters):
     return make_effect(name, parameters, ARRAY)

@@ -20,7 +20,7 @@ from sim.trials import Measurement, measure
 TWIN = small_twin()
 HIDDEN = cause_of("table_tilt", TWIN.array, [1.0, -0.5])
 POLICY = Policy()
-NOTHING_LEFT = LackOfFit(-np.inf, "", {})
+NOTHING_LEFT = LackOfFit(-np.inf, "")
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +55,7 @@ def test_an_explained_verdict(prepared, understanding):
 
 
 def test_an_unknown_verdict_names_no_cause_and_extends_no_twin(prepared, understanding):
-    left = LackOfFit(500.0, "rate² in a11", {})
+    left = LackOfFit(500.0, "rate² in a11")
     found = conclude(prepared, understanding, left, Gain(), POLICY, unknown=True)
     assert found.verdict == "unknown"
     assert found.causes == ()
@@ -73,7 +73,7 @@ def test_what_explains_most_comes_first(prepared, understanding, monkeypatch):
         names = [one.effect for one in conclude(with_fault, understanding, NOTHING_LEFT, Gain(), POLICY).causes]
         first = ["coarse_resolution", "table_tilt"] if size == "large" else ["table_tilt", "coarse_resolution"]
         assert names == [*first, "noise"]
-    unknown = conclude(prepared, understanding, LackOfFit(500.0, "a", {}), Gain(), POLICY, unknown=True)
+    unknown = conclude(prepared, understanding, LackOfFit(500.0, "a"), Gain(), POLICY, unknown=True)
     assert unknown.causes == ()  # noise is no cause beside what nothing explains
 
 
@@ -113,11 +113,11 @@ def test_a_lack_of_fit_widens_what_a_rough_model_says(understanding):
     fit = replace(explanation.best, point=point, objective=observations)
     rough = replace(explanation, best=fit)
     (usual,) = named_causes(rough, fit, POLICY)
-    (wider,) = named_causes(rough, fit, POLICY, LackOfFit(0.05 * removed, "", {}))
+    (wider,) = named_causes(rough, fit, POLICY, LackOfFit(0.05 * removed, ""))
     key, ratio = "amplitude_rad_s2", 0.1 / 1.1  # of what is left to all that there is
     assert usual.std[key] == pytest.approx(np.sqrt(0.02) * usual.parameters[key], rel=0.01)
     assert wider.std[key] == pytest.approx(np.sqrt(0.02 + ratio) * usual.parameters[key], rel=0.01)
-    (same,) = named_causes(explanation, explanation.best, POLICY, LackOfFit(0.05 * removed, "", {}))
+    (same,) = named_causes(explanation, explanation.best, POLICY, LackOfFit(0.05 * removed, ""))
     assert same.std == named_causes(explanation, explanation.best, POLICY)[0].std
 
 
@@ -139,13 +139,13 @@ def test_a_level_is_found_no_better_than_the_reading_that_gets_there(understandi
 def test_when_causes_are_believed(understanding):
     explanation = understanding.explanation
     removed = explanation.nothing.objective - explanation.best.objective
-    small = LackOfFit(0.5 * POLICY.lack_odds, "", {})
-    large = LackOfFit(removed, "rate²", {})
+    small = LackOfFit(0.5 * POLICY.lack_odds, "")
+    large = LackOfFit(removed, "rate²")
     assert not is_dominant(explanation, small, POLICY)
     assert is_dominant(explanation, large, POLICY)
     assert not is_unknown(explanation, small, Gain(), POLICY)
     assert is_unknown(explanation, large, Gain(), POLICY)
     # Significant, but little beside what the cause explains: the cause stands.
-    beside = LackOfFit(max(POLICY.lack_odds, POLICY.inexactness * removed) + 1.0, "rate²", {})
+    beside = LackOfFit(max(POLICY.lack_odds, POLICY.inexactness * removed) + 1.0, "rate²")
     assert 2.0 * beside.log_odds < POLICY.dominant * removed
     assert not is_unknown(explanation, beside, Gain(), POLICY)

@@ -27,13 +27,9 @@ def test_a_large_cause_beside_which_nothing_stays_is_believed():
     assert probability() > 0.9
 
 
-@pytest.mark.parametrize("doubt", [{"coincidence": 4.0}, {"unexplained": 30.0}, {"stds": 1.5}])
+@pytest.mark.parametrize("doubt", [{"unexplained": 30.0}, {"stds": 1.5}])
 def test_each_kind_of_doubt_lowers_it(doubt):
     assert probability(**doubt) < 0.9 * probability()
-
-
-def test_evidence_against_a_pattern_is_no_reward():
-    assert probability(coincidence=-50.0) == probability()
 
 
 def test_only_another_recording_makes_it_surer_than_the_rule():
@@ -56,11 +52,11 @@ def test_shapes_and_angles_do_not_stand_out():
 
 def test_a_verdict_has_the_product_and_says_so():
     found = made_diagnosis("explained")
-    doubted = with_library(found, LibraryEvidence(coincidence=3.0), {"table_tilt": ()}, POLICY)
+    doubted = with_library(found, LibraryEvidence(unexplained=3.0), {"table_tilt": ()}, POLICY)
     (before,), (after,) = found.causes, doubted.causes
     assert after.probability == pytest.approx(before.probability * doubted.library_probability)
     assert doubted.library_probability == pytest.approx(
-        library_probability(LibraryEvidence(coincidence=3.0), standing_out(before, ()), RULE, POLICY)
+        library_probability(LibraryEvidence(unexplained=3.0), standing_out(before, ()), RULE, POLICY)
     )
     assert "confounded with nothing outside the library" in doubted.sentences[-1]
     assert "--held-out" in doubted.sentences[-1]
@@ -69,7 +65,7 @@ def test_a_verdict_has_the_product_and_says_so():
 
 def test_a_fault_of_the_samples_is_seen_and_not_inferred():
     found = made_diagnosis("explained")
-    assert with_library(found, LibraryEvidence(coincidence=3.0), {}, POLICY) is found
+    assert with_library(found, LibraryEvidence(unexplained=3.0), {}, POLICY) is found
 
 
 @pytest.mark.parametrize("verdict", ["unknown", "nothing_found"])

@@ -24,12 +24,9 @@ def test_the_parts_write_themselves_as_the_contract_has_them():
     assert written["residual"]["unit"] == "m/s2"
     assert written["residual"]["after_by_channel"] == pytest.approx(dict(found.residual.after_by_channel))
     assert written["gain"]["held_out_rms_before"] == pytest.approx(found.gain.rms_before, nan_ok=True)
-    assert written["unexplained"]["surrogate"] == dict(found.unexplained.surrogate)
-    (located,) = written["unexplained"]["located"]
+    (located,) = written["causes"]
     assert (located["effect"], located["place"], located["function"]["x_unit"]) == ("unlisted", "reference", "rad/s")
-    assert set(written["unexplained"]) == {
-        "significant", "signature", "log_odds", "surrogate", "extends_twin", "left_out", "located", "mistake",
-    }  # fmt: skip
+    assert set(written["unexplained"]) == {"significant", "signature", "log_odds", "mistake"}
 
 
 def test_a_diagnosis_writes_its_folder_as_the_command_does(tmp_path):

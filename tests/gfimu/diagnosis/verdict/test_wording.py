@@ -80,15 +80,14 @@ def test_ambiguous_and_confounded():
 
 
 def test_unknown():
-    unexplained = Unexplained(True, "a11 has a tone", left_out=2)
-    words = told("unknown", unexplained=unexplained, terms=3)
-    assert words[0] == "The simulation is wrong in a way that nothing in the library explains: a11 has a tone."
-    assert words[1].startswith("3 functions of the motion or the angle describe it in the extended twin")
-    assert "2 functions of absolute time are left out" in words[1]
+    unexplained = Unexplained(True, "the offset of a11 changes, at 5 Hz")
+    words = told("unknown", [made_diagnosis("unknown").causes[0]], unexplained=unexplained)
+    assert words[0] == (
+        "The simulation is wrong in a way that nothing in the library explains: the offset of a11 changes, at 5 Hz."
+    )
+    assert words[1].startswith("The reference reads otherwise than the table turns, as a function of the rate")
     assert any(one.startswith("The residual falls") for one in words)
-    none = told("unknown", unexplained=Unexplained(True, "x"), terms=0)
-    assert none[1].startswith("No function that is added to channels or reference predicts it")
-    assert not any("significant residual remains" in one for one in (*words, *none))
+    assert not any("significant residual remains" in one for one in words)
 
 
 def test_notes_come_last_in_order():

@@ -13,10 +13,9 @@ import pytest
 import gfimu
 from gfimu import InputError
 from gfimu.diagnosis import State
-from gfimu.model import OF_READING, load_model
+from gfimu.model import load_model
 from gfimu.model.own_rig import Cause, Parameter, SimulatorModel, bias_cause, gain_cause
 from gfimu.model.own_rig.places import chip_patterns
-from gfimu.model.world_model import BasisUnits
 
 PENDULUM = Path(__file__).parents[4] / "docs" / "examples" / "pendulum.py"
 ARRAY = gfimu.AccelerometerArray.load("one_chip")
@@ -96,16 +95,21 @@ def test_causes_change_the_prediction_in_their_order():
     np.testing.assert_allclose(reference, 1.0)
 
 
+def nameless(dependence, series=("a12",), **numbers):
+    """A described error of a channel, or of the reference where it is of no series."""
+    place = {"place": "channel", "what": "offset", "pattern": "one", "series": list(series)}
+    place = place if series else {"place": "reference", "what": "reads"}
+    return {**place, "dependence": dependence, "numbers": numbers, "coefficients": [[0.4]]}
+
+
 def test_what_has_no_name_is_added_per_channel_or_to_the_reference():
-    here, units = model(), BasisUnits(2.0, 1.0, 2.0)
-    cubic = here.unnamed(OF_READING, units)({"a13_m_s2": 0.1})
-    np.testing.assert_allclose(here.predict(Still(), T, effects=[cubic])[0][:, 2], 9.8 + 0.1 * (9.8 / 9.80665) ** 3)
-    rate = here.unnamed("rate", units)({"a12_m_s2": 0.4})
+    here = model()
+    cubic = here.described(nameless("y^3", ["a13"], most=10.0))
+    np.testing.assert_allclose(here.predict(Still(), T, effects=[cubic])[0][:, 2], 9.8 + 0.4 * (9.8 / 9.80665) ** 3)
+    rate = here.described(nameless("omega", scale=2.0, first=0.0))
     np.testing.assert_allclose(here.predict(Still(), T, effects=[rate])[0][:, 1], 0.2)
-    read = here.unnamed("rate", units, of_reference=True)
-    np.testing.assert_allclose(here.predict(Still(), T, effects=[read({"reference_rad_s": 0.4})])[1], 1.2)
-    assert here.unnamed("slow time (1 half-waves)", units).of_one_recording
-    assert not read.of_one_recording
+    read = here.described(nameless("omega", (), scale=2.0, first=0.0))
+    np.testing.assert_allclose(here.predict(Still(), T, effects=[read])[1], 1.2)
 
 
 def test_the_noise_follows_the_band():
@@ -178,13 +182,13 @@ def test_a_twin_file_with_an_unknown_effect_is_refused(tmp_path):
 
 def test_a_term_without_a_name_comes_back_from_its_twin_file(tmp_path):
     pendulum = load_model(f"{PENDULUM}:twin")
-    term = pendulum.unnamed("rate²", BasisUnits(2.0, 1.0, 2.0))({"a12_m_s2": 0.4})
+    term = pendulum.described(nameless("omega^2", scale=4.0, first=0.0))
     file = tmp_path / "twin.toml"
     file.write_text(pendulum.extended([term]).to_toml())
     again = load_model(file, allow_code=True)
     np.testing.assert_allclose(again.predict(Still(), T)[0], pendulum.predict(Still(), T, effects=[term])[0])
-    file.write_text(f'simulator = "{PENDULUM}:twin"\n[[effect]]\nname = "unknown"\n')
-    with pytest.raises(InputError, match="effect 'unknown'"):
+    file.write_text(f'simulator = "{PENDULUM}:twin"\n[[effect]]\nname = "unlisted"\n')
+    with pytest.raises(InputError, match="effect 'unlisted': 'what' is missing"):
         load_model(file, allow_code=True)
 
 

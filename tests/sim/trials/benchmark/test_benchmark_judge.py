@@ -11,6 +11,7 @@ from sim.trials.benchmark.judged import Judged
 from sim.trials.benchmark.judged_file import read_judged, write_judged
 from sim.trials.benchmark.table import Share, summaries
 from sim.trials.benchmark.truth_file import Fixed, fixed_world, truths
+from sim.trials.benchmark.unlisted import GOES_WITH, PLACES, PLACES_OF_LISTED, UNLISTED_TRUTH, quantities_of
 from sim.trials.benchmark.world import Truth
 
 LISTED = [fixed for fixed in truths().values() if fixed.case.set_name != "unlisted"]
@@ -110,10 +111,40 @@ def test_an_unlisted_effect_is_described_by_place_or_by_a_name_of_its_own():
     assert outcome_of(said(fixed, "unlisted", place="reference"), fixed) == ("alone", 1.0)
     assert outcome_of(said(fixed, "unlisted", place="chip"), fixed)[0] == "wrong"
     assert outcome_of(said(fixed, "unlisted", name="reference_rate_cubed", place="reference"), fixed)[0] == "alone"
-    assert outcome_of(said(fixed, "unlisted", place="reference", dependence="omega"), fixed)[0] == "wrong"
+    assert outcome_of(said(fixed, "unlisted", place="reference", dependence="omega^3"), fixed) == ("alone", 1.0)
+    assert outcome_of(said(fixed, "unlisted", place="reference", dependence="alpha"), fixed) == ("set", 0.5)
+    assert outcome_of(said(fixed, "unlisted", place="channel", dependence="omega^3"), fixed)[0] == "wrong"
     assert outcome_of(said(fixed, "quadratic"), fixed)[0] == "wrong"
     near = next(one for one in UNLISTED if one.truth.near)
     assert outcome_of(said(near, near.truth.near[0]), near) == ("set", 0.5)
+
+
+def test_the_place_of_a_listed_effect_is_worth_half_its_name():
+    fixed = world_with("mount_tilt")
+    assert outcome_of(said(fixed, "unlisted", place="array"), fixed) == ("set", 0.5)
+    assert outcome_of(said(fixed, "unlisted", place="bench"), fixed) == ("wrong", -1.0)
+    two = world_with("mount_tilt", "bias")
+    assert outcome_of(said(two, "unlisted", place="array"), two) == ("part", 0.5)
+    there = [CauseAnswer("bias"), CauseAnswer("unlisted", place="array")]
+    assert outcome_of(Answer(two.case.world, "unknown", there), two) == ("set", 0.5)
+
+
+def test_every_listed_effect_has_a_place_and_every_dependence_its_quantities():
+    assert set(PLACES_OF_LISTED) == set(EFFECTS)
+    assert {place for places in PLACES_OF_LISTED.values() for place in places} <= set(PLACES)
+    assert set(GOES_WITH) <= set(UNLISTED_TRUTH)
+    for dependence, quantities in {
+        "f(omega, alpha)": {"omega", "alpha"},
+        "order 7.3 |omega|": {"theta", "omega"},
+        "mode at 6.2 Hz of alpha": {"alpha"},
+        "tone at 23.7 Hz": {"t"},
+        "memory of alpha": {"alpha"},
+        "y^3": {"y"},
+        "1": {"1"},
+        "T lagging": {"T"},
+        "time": {"t"},
+    }.items():
+        assert quantities_of(dependence) == quantities
 
 
 def tilt(x, y, std, world="independent/dev/000"):

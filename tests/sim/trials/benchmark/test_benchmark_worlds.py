@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from sim.effects import EFFECTS, TABLE_EFFECTS
+from sim.effects import EFFECTS
 from sim.trials.benchmark.drawing import draw, effects_of, fresh_motion
 from sim.trials.benchmark.generators.foreign_effects import FOREIGN
 from sim.trials.benchmark.generators.independent_effects import DRAWS, EXOTICS
@@ -63,7 +63,6 @@ def test_the_right_answers_for_unlisted_effects_exist():
     assert set(UNLISTED_TRUTH) == set(FOREIGN) | set(EXOTICS)
     for name, truth in UNLISTED_TRUTH.items():
         assert truth.place in PLACES
-        assert set(truth.right) <= set(TABLE_EFFECTS)
         assert set(truth.near) <= set(EFFECTS)
         if name in FOREIGN:
             assert (truth.place, set(FOREIGN[name].kin) - set(truth.near)) == (FOREIGN[name].place, set())

@@ -1,4 +1,4 @@
-"""The points of the grammar and the further effects of a rig, against MuJoCo, closed forms and their own definition."""
+"""The further effects of a rig, against MuJoCo, closed forms and their own definition."""
 
 import numpy as np
 import pytest
@@ -7,9 +7,8 @@ from scipy.signal import lsim, lti
 from gfimu import AccelerometerArray, InputError
 from gfimu.base import find_model
 from sim import SpinState, forward, prescribed_readings
-from sim.effects import EFFECTS, FURTHER_EFFECTS, make_effect
+from sim.effects import EFFECTS, FURTHER_EFFECTS, SIMULATED_EFFECTS, make_effect
 from sim.effects.rig import shake_orders, sway_shapes
-from sim.effects.unlisted import UNLISTED
 from sim.scenarios import Scenario
 from sim.trials import random_profile
 from sim.twin import Twin
@@ -19,13 +18,14 @@ TWIN = Twin(array=ARRAY, array_name="cube12")
 T = np.arange(0.0, 20.0, 0.01)
 WARM = 25.0 + 3.0 * (1.0 - np.exp(-T / 6.0))
 MOTION = random_profile(np.random.default_rng(1), 20.0)
-OF_REFERENCE = {name for name, family in FURTHER_EFFECTS.items() if family.place == "reference"}
-WHOLE_CUBE = {name for name, family in FURTHER_EFFECTS.items() if family.place == "geometry"}
+FURTHER = FURTHER_EFFECTS | {name: one for name, one in SIMULATED_EFFECTS.items() if name != "proof_mass"}
+OF_REFERENCE = {name for name, family in FURTHER.items() if family.place == "reference"}
+WHOLE_CUBE = {name for name, family in FURTHER.items() if family.place == "geometry"}
 
 
 def usual(name, rng=None):
     """An effect of usual size, in its first shape."""
-    family = FURTHER_EFFECTS[name]
+    family = FURTHER[name]
     sizes = np.array([size.prior_std for size in family.sizes(ARRAY)])
     if rng is not None:
         sizes = sizes * np.where([one.positive for one in family.sizes(ARRAY)], 1.0, rng.standard_normal(len(sizes)))
@@ -38,10 +38,10 @@ def changes(*effects):
     return after[0] - before[0], after[1] - before[1]
 
 
-@pytest.mark.parametrize("name", FURTHER_EFFECTS)
+@pytest.mark.parametrize("name", FURTHER)
 def test_an_effect_comes_back_from_its_sizes_and_from_a_twin_file(name, tmp_path):
     effect = usual(name, np.random.default_rng(2))
-    family = FURTHER_EFFECTS[name]
+    family = FURTHER[name]
     again = family.from_sizes(ARRAY, effect.size_values(ARRAY), effect.shape_values())
     assert again.parameters == pytest.approx(effect.parameters)
     effect.check(ARRAY)
@@ -55,7 +55,7 @@ def test_an_effect_comes_back_from_its_sizes_and_from_a_twin_file(name, tmp_path
         np.testing.assert_allclose(one, other, rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize("name", FURTHER_EFFECTS)
+@pytest.mark.parametrize("name", FURTHER)
 def test_an_effect_acts_at_its_place_alone(name):
     channels, reference = changes(usual(name))
     if name in OF_REFERENCE:
@@ -76,49 +76,6 @@ def test_mujoco_agrees_on_what_leans_and_shakes(name):
     seen = forward.channels(world, MOTION, t)
     change = np.abs(expected - prescribed_readings(TWIN.world(), MOTION, t)).max()
     assert np.abs(seen - expected).max() < 0.02 * change
-
-
-def test_a_cube_that_leans_at_once_about_its_foot_is_a_tilted_mounting_moved():
-    """A constant lean turns the axes and moves the centre, so that it is two effects of the first table."""
-    x, y = 2e-6, -1e-6
-    angle = MOTION.at(T).angle
-    leant = make_effect("lean_by_turns", {"x_rad_per_rad": x, "y_rad_per_rad": y})
-    channels, _ = changes(leant)
-    late = np.flatnonzero(np.abs(MOTION.at(T).rate) < 1e-6)
-    tilt = make_effect("mount_tilt", {"x_rad": x * angle[late[-1]], "y_rad": y * angle[late[-1]]})
-    still, _ = changes(tilt)
-    np.testing.assert_allclose(channels[late[-1]], still[late[-1]], atol=1e-4 * np.abs(still).max())
-
-
-@pytest.mark.parametrize(
-    ("name", "function"),
-    [
-        ("reference_offset", lambda spin: np.ones_like(spin.rate)),
-        ("reference_by_direction", lambda spin: np.abs(spin.rate)),
-        ("reference_rate_squared", lambda spin: spin.rate * np.abs(spin.rate)),
-        ("reference_rate_cubed", lambda spin: spin.rate**3),
-    ],
-)
-def test_the_error_of_a_reference_is_its_function(name, function):
-    effect = usual(name)
-    (size,) = effect.size_values(ARRAY)
-    np.testing.assert_allclose(changes(effect)[1], size * function(MOTION.at(T)), atol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("name", "function"),
-    [
-        ("gain_by_speed", lambda spin: np.abs(spin.rate)),
-        ("gain_by_rate_squared", lambda spin: spin.rate**2),
-        ("gain_by_load", lambda spin: np.abs(spin.acceleration)),
-        ("gain_temperature", lambda spin: WARM - 25.0),
-    ],
-)
-def test_a_gain_of_the_supply_multiplies_every_reading(name, function):
-    effect = usual(name)
-    (ratio,) = effect.size_values(ARRAY)
-    readings, _ = TWIN.predict(MOTION, T)
-    np.testing.assert_allclose(changes(effect)[0], readings * ratio * function(MOTION.at(T))[:, None], atol=1e-12)
 
 
 def test_a_slow_tachometer_is_a_first_order_filter():
@@ -162,20 +119,8 @@ def test_a_scan_finds_the_order_of_a_shake():
     assert looks > 100
 
 
-def test_names_are_new_and_points_say_what_they_go_with():
-    assert not set(FURTHER_EFFECTS) & set(EFFECTS)
-    assert set(UNLISTED) <= set(FURTHER_EFFECTS)
-    for name, family in UNLISTED.items():
-        assert family.name == name
-        assert family.grammar_place
-        assert family.dependence.words
-        assert family.summary
-        assert family.separated_by
-
-
-def test_a_wrong_key_of_a_point_is_refused():
-    with pytest.raises(InputError, match=r"reference_rate_cubed.*unknown parameter 'x_m'.*error_rad_s_per_rad3_s3"):
-        make_effect("reference_rate_cubed", {"x_m": 1.0}, ARRAY)
+def test_names_are_new():
+    assert not set(FURTHER) & set(EFFECTS)
 
 
 def test_a_scan_finds_the_mode_of_a_bench():
@@ -193,6 +138,7 @@ def test_a_scan_finds_the_mode_of_a_bench():
 def test_a_tumbling_body_has_no_spin_that_an_effect_could_go_with(tmp_path):
     path = tmp_path / "tumble.toml"
     scenario = find_model("scenarios", "tumble").read_text(encoding="utf-8")
-    path.write_text(f'{scenario}\n[[effect]]\nname = "gain_by_speed"\nparameters = {{ ratio_per_rad_s = 1e-3 }}\n')
-    with pytest.raises(InputError, match=r"gain_by_speed.*which a tumbling body has not"):
+    table = 'place = "supply", what = "gain", dependence = "1", numbers = { scale = 1.0, first = 0.0 }'
+    path.write_text(f'{scenario}\n[[effect]]\nname = "unlisted"\nparameters = {{ {table}, coefficients = [[0.1]] }}\n')
+    with pytest.raises(InputError, match=r"unlisted.*which a tumbling body has not"):
         Scenario.load(path)
