@@ -250,7 +250,7 @@ class Twin:
         same = {Misalignment.name} if len(self.array.chips) == 1 else set()
         return {name: one for name, one in (CARRIAGE_EFFECTS | added).items() if name not in same}
 
-    def described(self, parameters: Mapping[str, Any]) -> Effect:
+    def described(self, parameters: Mapping[str, object]) -> Effect:
         """Return an error without a name as an effect, from the parameters of `Unlisted`."""
         return Unlisted(parameters)
 

@@ -77,7 +77,6 @@ missed. *Share* is the part of an effect's energy, in units of the noise, that a
 squared correlation of the two changes of the data, after the other unknowns are fitted. *Nats* is
 the expected difference of the log likelihoods of the effect and the rival; below {SEPARATED:g} the two are not
 separable. The figures are computed as `gfimu check` and `gfimu design` do, for `cube12` with ADXL345 chips at 100 Hz.
-Effects marked ° belong to the wider library, which is searched where the evidence asks for it.
 
 Motions: *constant spin*, 30 s at 4 rad/s; *speed sweep*, the scenario `speed_sweep`; *tilted rest*, 60 s at rest,
 tilted by 30°; *calibration poses*, 18 rests of 6 s with faces and edges up; *tumble* and *in the hand*, the scenarios
@@ -90,9 +89,7 @@ The pages are made from the code: the text from the docstring of the effect's cl
 ```
 python docs/scripts/make_effect_catalogue.py --compute --effect my_effect
 ```
-A test fails as long as a registered effect has no page, picture or formula. An effect of the wider library is in
-`sim/effects/unlisted_rig.py` or `unlisted_chips.py`. It is registered in `unlisted.py` and gets its page in the same
-way. For effects that an installed package adds (entry point `gfimu.effects`), `--out FOLDER` writes their pages into a
+A test fails as long as a registered effect has no page, picture or formula. For effects that an installed package adds (entry point `gfimu.effects`), `--out FOLDER` writes their pages into a
 folder of that package; `gfimu show` prints the docstring. Their rivals are computed among gfimu's own effects too. The
 verdict `unknown` has the page of that name."""
 

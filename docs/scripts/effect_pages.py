@@ -12,11 +12,10 @@ from gfimu.array.array import AccelerometerArray
 from gfimu.diagnosis.design.proposal import SEPARATED
 from gfimu.diagnosis.policy import Policy
 from gfimu.model.parameter_units import NAME, NUMBER, RATIO
-from sim.effects import BODY_EFFECTS, CARRIAGE_EFFECTS, FURTHER_EFFECTS, TABLE_EFFECTS
+from sim.effects import BODY_EFFECTS, CARRIAGE_EFFECTS, TABLE_EFFECTS
 from sim.effects.base import Effect
 from sim.effects.catalogue import every_effect
 from sim.effects.description import Description, describe
-from sim.effects.unlisted import Unlisted
 
 __all__ = ["EXPERIMENTS", "PLACES", "link", "page", "place_of"]
 
@@ -57,7 +56,7 @@ def place_of(effect: type[Effect]) -> str:
     """Return where an effect acts: a key of `PLACES`."""
     if effect.name in _OF_GRAVITY:
         return "gravity"
-    moves = effect.name in _MOVING or effect.name.startswith("lean_")
+    moves = effect.name in _MOVING
     return "motion" if moves else _PLACE.get(effect.place, effect.place)
 
 
@@ -101,12 +100,10 @@ def _where(effect: type[Effect]) -> str:
         if library.get(effect.name) is not None
     ]
     looked = f"A diagnosis looks for it on {_and(kinds)}" if kinds else "A diagnosis does not look for it"
-    if effect.name in FURTHER_EFFECTS and effect.name not in BODY_EFFECTS:
-        looked += ", in the wider library that is searched where the evidence asks for it"
     if effect.name == "angle_zero":
         looked = "A diagnosis looks for it on an inclined table with an encoder"
     if effect.name == "unknown":
-        looked = "A diagnosis writes it into `twin.toml` where nothing in the library explains a dependence"
+        looked = "A diagnosis does not look for it: what has no name it describes by its place"
     per_run = " Each mounting has its own." if effect.per_run else ""
     return f"Place in the chain: **{place}** ({PLACES[place]}). {looked}.{per_run}"
 
@@ -270,13 +267,7 @@ def _trial(effect: type[Effect], text: Description, found: Mapping[str, Any] | N
     if effect.name.startswith("gyro_"):
         lines.append('`free.toml` is a copy of the twin `cube12_turntable` with `source = "gyro"` in `[drive]`.')
     lines.append(f'In a twin file it is a table `[[effect]]` with `name = "{effect.name}"` and the same parameters.')
-    if isinstance(effect, type) and issubclass(effect, Unlisted):
-        dependence = effect.dependence.name
-        lines.append(
-            f'`verdict.json` names it `"effect": "unlisted"` with `"place": "{effect.grammar_place}"`, '
-            f'`"dependence": "{dependence}"` and `"name": "{effect.name}"`.'
-        )
-    elif effect.name not in ("unknown", "proof_mass"):
+    if effect.name not in ("unknown", "proof_mass"):
         lines.append(f'`verdict.json` names it `"effect": "{effect.name}"`.')
     if found is not None and found["of"] == text.example:
         lines.append(f"What the diagnosis of this recording says: {_verdict(found)}.")
@@ -309,9 +300,8 @@ def _on_rail(effect: type[Effect]) -> str:
 
 
 def link(name: str) -> str:
-    """Return an effect's name as a link to its page; ° marks one of the wider library."""
-    mark = "°" if name in FURTHER_EFFECTS else ""
-    return f"[{name}]({name}.md){mark}" if name in every_effect() else f"`{name}`"
+    """Return an effect's name as a link to its page."""
+    return f"[{name}]({name}.md)" if name in every_effect() else f"`{name}`"
 
 
 def _and(items: list[str]) -> str:

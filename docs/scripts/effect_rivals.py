@@ -121,7 +121,7 @@ def _table_rig() -> Rig:
     by_hand = tuple(PlannedRun(rest, poses.rest, mounting=one) for one in mountings)
     heated = HeatedRest(rest, 120.0)
     return Rig(
-        Twin.load("cube12_turntable").searching(wide=True),
+        Twin.load("cube12_turntable"),
         {
             "constant spin": (PlannedRun(steady(4.0, 30.0), 30.0),),
             "speed sweep": (upright,),

@@ -23,7 +23,6 @@ from PIL import Image
 
 from gfimu.array.array import AccelerometerArray
 from sim.effects import make_effect
-from sim.effects.grammar import TURNS
 from sim.motions.motion import SpinState
 from sim.scenarios import Scenario
 from sim.twin import Twin
@@ -154,8 +153,6 @@ def signature(name: str, parameters: Mapping[str, Any]) -> Signature:
         quantities = {"table angle, rad": quantities["table angle, rad"]}
     if effect.needs_temperature:
         quantities["temperature, °C"] = temperature
-    if getattr(effect, "dependence", None) is TURNS:
-        quantities["angle turned, rad"] = spin.angle
     against, values, share = _natural(drawn[:, 0], quantities)
     return Signature(run.name, t, names, unit, drawn, rms, against, values, share)
 

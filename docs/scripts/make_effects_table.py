@@ -11,13 +11,11 @@ from pathlib import Path
 
 from gfimu import AccelerometerArray
 from sim.effects import CARRIAGE_EFFECTS, EFFECTS, FURTHER_EFFECTS, Effect
-from sim.effects.unlisted import UNLISTED
 
 PAGE = Path(__file__).resolve().parents[1] / "how_to" / "diagnosis.md"
 START, STOP = "<!-- effects: made by make_effects_table.py -->", "<!-- effects: end -->"
 CARRIAGE = ("<!-- linear axis: made by make_effects_table.py -->", "<!-- linear axis: end -->")
 FURTHER = ("<!-- further effects: made by make_effects_table.py -->", "<!-- further effects: end -->")
-GRAMMAR = ("<!-- grammar: made by make_effects_table.py -->", "<!-- grammar: end -->")
 MOST_KEYS = 4
 
 
@@ -32,16 +30,6 @@ def effects_table(effects: Mapping[str, type[Effect]] = EFFECTS) -> str:
     return "\n".join(rows)
 
 
-def grammar_table() -> str:
-    """Return the points of the grammar: name, place, dependence, what is wrong, parameters."""
-    rows = ["| name | place | goes with | what is so in the world and missing in the simulation | parameters |"]
-    rows.append("|---|---|---|---|---|")
-    for name, point in UNLISTED.items():
-        place, words = point.grammar_place, point.dependence.words.replace("|", "\\|")
-        rows.append(f"| `{name}` | {place} | {words} | {point.summary.replace('|', chr(92) + '|')} | {_keys(point)} |")
-    return "\n".join(rows)
-
-
 def _keys(effect: type[Effect]) -> str:
     keys = effect.parameter_keys(AccelerometerArray.load("cube12"))
     return ", ".join(f"`{key}`" for key in keys[:MOST_KEYS]) + (" …" if len(keys) > MOST_KEYS else "")
@@ -49,13 +37,11 @@ def _keys(effect: type[Effect]) -> str:
 
 def with_table(page: str) -> str:
     """Return the text of the page with the present tables between their marks."""
-    named = {name: effect for name, effect in FURTHER_EFFECTS.items() if name not in UNLISTED}
     linear = {name: effect for name, effect in CARRIAGE_EFFECTS.items() if EFFECTS.get(name) is not effect}
     parts = (
         ((START, STOP), effects_table()),
         (CARRIAGE, effects_table(linear)),
-        (FURTHER, effects_table(named)),
-        (GRAMMAR, grammar_table()),
+        (FURTHER, effects_table(FURTHER_EFFECTS)),
     )
     for (start, stop), table in parts:
         pattern = re.compile(re.escape(start) + ".*?" + re.escape(stop), flags=re.DOTALL)

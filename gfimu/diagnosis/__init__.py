@@ -36,7 +36,9 @@ if TYPE_CHECKING:
     from gfimu.diagnosis.report.plain_words import headline, next_steps, story
     from gfimu.diagnosis.report.rig import DrawnRig
     from gfimu.diagnosis.report.tables import diagnosis_tables
-    from gfimu.diagnosis.search.free_time import free_time
+    from gfimu.diagnosis.search.challenge import challenged
+    from gfimu.diagnosis.search.explain import Explanation
+    from gfimu.diagnosis.search.free_time import FreeTime, free_time
     from gfimu.diagnosis.search.located_screen import LocatedScreen
     from gfimu.diagnosis.search.long_run import spread_over_runs, understand_any_length
     from gfimu.diagnosis.search.waves import signal_of
@@ -52,6 +54,7 @@ if TYPE_CHECKING:
     from gfimu.diagnosis.terms.reach import behind_wiring, disjoint
     from gfimu.diagnosis.time_limit import check_time, limited_to
     from gfimu.diagnosis.verdict.likely_mistakes import likely_mistake
+    from gfimu.diagnosis.verdict.located import located_cause, of_free_time
     from gfimu.diagnosis.verdict.parts import Located, ReferenceClock
     from gfimu.diagnosis.verdict.sample_notes import with_reference_clock, with_sample_notes
     from gfimu.diagnosis.verdict.verdict import Diagnosis

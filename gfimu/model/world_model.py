@@ -310,7 +310,7 @@ class WorldModel(Protocol):
         """Return all kinds of effects it could have, by name."""
         ...
 
-    def described(self, parameters: Mapping[str, Any]) -> Effect:
+    def described(self, parameters: Mapping[str, object]) -> Effect:
         """Return an error without a name as an effect (`gfimu.model.located.effect.LocatedEffect.parameters`)."""
         ...
 

@@ -22,7 +22,6 @@ from sim.effects.registry import (
     TABLE_EFFECTS,
 )
 from sim.effects.unknown import Unknown
-from sim.effects.unlisted import Unlisted
 
 __all__ = ["essence", "every_effect"]
 
@@ -55,7 +54,7 @@ them: `gfimu.diagnosis` stands above this room, and a test compares the two."""
 def every_effect() -> dict[str, type[Effect]]:
     """Return every effect of gfimu by name; of a name that a linear axis has too, that of the table."""
     known = CARRIAGE_EFFECTS | BODY_EFFECTS | TABLE_EFFECTS | INCLINED_EFFECTS | SIMULATED_EFFECTS
-    known = {**known, **{one.name: one for one in (Unknown, Unlisted)}}
+    known = {**known, Unknown.name: Unknown}
     first = [*TABLE_EFFECTS, *known]
     return {name: known[name] for name in dict.fromkeys(first)}
 

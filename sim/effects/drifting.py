@@ -110,6 +110,7 @@ class ColdStart(WarmUp):
     :experiment: Record a rest directly after the calibration, without switching off: the offsets are zero then. Record
         another one after a cold start: they decay to zero. A constant bias shows in both.
     :recordings: No real recording at hand was found to have it; the settling of the MIMU4444 is listed at `warm_up`.
+    :rivals: On one recording it is a ``warm_up`` beside a ``bias``; a diagnosis names these.
     """
 
     name = "cold_start"

@@ -125,6 +125,7 @@ class BearingShake(Effect):
     :example: amplitude_m_s2_per_rad_s = 0.02, order = 7.3, phase_rad = 0.0
     :experiment: Turn steadily, slow and fast. The line in the vertical channels follows the rate at the same number of
         cycles per revolution, whole or not; an interference keeps its frequency.
+    :rivals: A diagnosis describes it by a function of the angle at the bench.
     """
 
     name = "bearing_shake"
@@ -228,6 +229,7 @@ class BenchSway(Effect):
     :example: x_cosine_m = 0.001, y_sine_m = 0.001, frequency_hz = 1.5, damping_ratio = 0.05
     :experiment: Pass slowly through the speed at which the bench sways most. Balance the table, or clamp the bench: the
         sway disappears.
+    :rivals: A diagnosis describes it by a mode at the bench.
     """
 
     name = "bench_sway"

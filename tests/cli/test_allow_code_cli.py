@@ -102,7 +102,7 @@ def test_the_twin_file_of_a_verdict_asks_again(gfimu_command, here):
         ('simulator = "none.py:twin"\n', "none.py: no such file"),
         ("simulator = 3\n", "simulator = 3 must be a string"),
         ('simulator = "rig.py:twin"\neffect = 3\n', "effect = 3 must be an array of tables"),
-        ('simulator = "rig.py:twin"\neffect = [{name = "radius", parameters = {radius_m = []}}]\n', "parameters"),
+        ('simulator = "rig.py:twin"\neffect = [{name = "radius", parameters = {radius_m = []}}]\n', "radius_m"),
         ('simulator = "rig.py:twin"\neffect = [{name = "radius", parameters = {radius_m = "x"}}]\n', "radius_m"),
         ('simulator = "rig.py:twin"\neffect = [{name = "radius", parameters = {radius_m = 1e999}}]\n', "finite"),
     ],

@@ -233,7 +233,7 @@ def test_what_is_known_is_written_and_printed_when_it_is_ended(
     gfimu_command, ordinary, tmp_path, plain_report, monkeypatch, number, by, code, for_machines
 ):
     plain_report()
-    monkeypatch.setattr("gfimu.diagnosis.one_library.LibraryDiagnosis.understood", signalling(number))
+    monkeypatch.setattr("gfimu.diagnosis.steps.Steps.understood", signalling(number))
     ordinary.write(tmp_path / "run.parquet")
     options = ["--time-limit", "0.1"] if number is None else []
     out = tmp_path / "made"

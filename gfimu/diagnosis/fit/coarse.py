@@ -41,7 +41,7 @@ class Rows:
 
 
 WHOLE = Rows(np.zeros(0, dtype=np.intp), np.zeros(0, dtype=np.intp))
-"""Rows as they are."""
+"""Rows as they are. Numerical: no groups."""
 
 
 class _AveragedModes(SlowModes):

@@ -153,7 +153,9 @@ def _tried(
 ) -> list[Fit]:
     """Return fits of a set with located terms, beside it or instead of some of its causes, best first."""
     cases: list[tuple[Key, float]] = [(frozenset(), needed - policy.worth_a_search)]
-    cases += [(leading.key - one.key, _gains(leading, one) - policy.close) for one in fewer]
+    for one in fewer:  # of what is large the linear world misses a share
+        missed = max(policy.close, policy.inexactness * (one.objective - leading.objective))
+        cases.append((leading.key - one.key, _gains(leading, one) - missed))
     screen = LocatedScreen(stretches, leading.point)
     promised = [
         (base.log_posterior + leader.log_odds, leader, base)

@@ -54,6 +54,10 @@ def free_time(stretches: Sequence[Stretch], point: Point, policy: Policy) -> lis
     The noise is the learnt one, but with the same slow noise in all channels, as that of one channel would take in what
     is looked for.
     """
+    if point.residue is not None:
+        known = point.residue.effects(stretches[0], linearise(stretches, point).residue)
+        stretches = [replace(stretch, known=(*stretch.known, *known)) for stretch in stretches]
+        point = replace(point, residue=None)
     levels = tuple(_alike(one, policy.largest_flicker) for one in point.levels)
     point = fit(stretches, replace(point, levels=levels), replace(policy, steps=FEW)).point
     totals: dict[str, FreeTime] = {}

@@ -56,7 +56,7 @@ class Diagnosis(Declared, PlottedResult):
     library_probability: Annotated[
         float,
         figure(
-            "Probability that the library, or the grammar, holds the truth: that the causes are confounded with "
+            "Probability that the library holds the truth: that the causes are confounded with "
             "nothing outside it, the least of them; null where no cause was inferred."
         ),
     ] = float("nan")

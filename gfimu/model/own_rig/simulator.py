@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import tomli_w
@@ -93,7 +93,7 @@ class SimulatorModel:
         """Return the causes by name."""
         return {cause.name: cause for cause in self.causes}
 
-    def described(self, parameters: Mapping[str, Any]) -> LocatedEffect:
+    def described(self, parameters: Mapping[str, object]) -> LocatedEffect:
         """Return an error without a name as an effect, from its parameters."""
         return LocatedEffect.of_parameters(parameters, self.array)
 

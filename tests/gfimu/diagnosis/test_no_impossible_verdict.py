@@ -91,7 +91,7 @@ class Singular:
 def test_causes_that_cannot_be_judged_on_held_out_data_do_not_stand(twin, monkeypatch):
     tilted = make_effect("mount_tilt", {"x_rad": 0.01, "y_rad": 0.0})
     run = measure(np.random.default_rng(3), twin, [tilted], Measurement(duration=12.0))
-    monkeypatch.setattr(sys.modules["gfimu.diagnosis.one_library"], "gate_gains", Singular())
+    monkeypatch.setattr(sys.modules["gfimu.diagnosis.steps"], "gate_gains", Singular())
     found = diagnose([run], twin)
     assert (found.verdict, found.causes) == ("unknown", ())
     assert "can't be fitted to part of it" in found.unexplained.signature
@@ -99,6 +99,6 @@ def test_causes_that_cannot_be_judged_on_held_out_data_do_not_stand(twin, monkey
 
 def test_equations_without_a_solution_are_one_line_with_a_remedy(twin, monkeypatch):
     run = measure(np.random.default_rng(3), twin, [], Measurement(duration=8.0))
-    monkeypatch.setattr(sys.modules["gfimu.diagnosis.one_library"], "understand_any_length", Singular())
+    monkeypatch.setattr(sys.modules["gfimu.diagnosis.steps"], "understand_any_length", Singular())
     with pytest.raises(InputError, match=r"first\.csv: the equations of this run have no solution .*; are the"):
         diagnose([run], twin, names=["first.csv"])

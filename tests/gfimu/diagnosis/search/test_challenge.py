@@ -10,7 +10,18 @@ from few_effects import having
 from no_name import Bent, Leaning
 
 from gfimu import AccelerometerArray
-from gfimu.diagnosis import LOCATED, Policy, diagnose, headline
+from gfimu.diagnosis import (
+    LOCATED,
+    Explanation,
+    Policy,
+    challenged,
+    diagnose,
+    headline,
+    prepare,
+    starting_point,
+    stretches_of,
+)
+from gfimu.diagnosis.fit.gauss_newton import fit
 from sim.effects import make_effect
 from sim.trials import Measurement, measure
 from sim.twin import Twin
@@ -97,3 +108,13 @@ def test_what_goes_with_nothing_has_a_place_all_the_same():
 def test_nothing_is_located_where_nothing_is_hidden(seed):
     found = found_in(seed=seed)
     assert (found.verdict, found.causes) == ("nothing_found", ())
+
+
+def test_an_explanation_without_anything_to_add_stays_as_it_is():
+    recording = measure(np.random.default_rng(1), TWIN, [], Measurement(duration=15.0))
+    stretches = stretches_of(TWIN, prepare([recording], TWIN, ["run"]))
+    nothing = fit(stretches, starting_point(stretches, POLICY.knots), POLICY)
+    before = Explanation(nothing, nothing, {}, (), None, stretches)
+    after = challenged(before, POLICY)
+    assert after.best is nothing
+    assert all(rival.log_posterior < nothing.log_posterior + POLICY.cause_odds for rival in after.rivals)
