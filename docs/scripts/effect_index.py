@@ -89,8 +89,9 @@ The pages are made from the code: the text from the docstring of the effect's cl
 ```
 python docs/scripts/make_effect_catalogue.py --compute --effect my_effect
 ```
-A test fails as long as a registered effect has no page, picture or formula. For effects that an installed package adds (entry point `gfimu.effects`), `--out FOLDER` writes their pages into a
-folder of that package; `gfimu show` prints the docstring. Their rivals are computed among gfimu's own effects too. The
+A test fails as long as a registered effect has no page, picture or formula. For effects that an installed package adds
+(entry point `gfimu.effects`), `--out FOLDER` writes their pages into a folder of that package; `gfimu show` prints the
+docstring. Their rivals are computed among gfimu's own effects too. The
 verdict `unknown` has the page of that name."""
 
 

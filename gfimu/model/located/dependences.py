@@ -358,7 +358,7 @@ _ENVELOPES: dict[str, Callable[[_Floats], _Floats]] = {
 
 @dataclass(frozen=True)
 class Revolution(Dependence):
-    """A function of the angle within a revolution, by harmonics, times what its name says of the rate over ``scale``."""
+    """A function of the angle within a revolution, by harmonics, times what its name says of rate over ``scale``."""
 
     name: str
     scale: float = 1.0

@@ -61,13 +61,13 @@ class LocatedEffect(AddedEffect):
             coefficients = np.array(parameters["coefficients"], dtype=float)
         except (KeyError, TypeError, ValueError) as error:
             raise InputError(
-                f"effect {UNLISTED!r}: {error} is missing, unknown or no number; take the table as gfimu diagnose wrote it"
+                f"effect {UNLISTED!r}: {error} is missing, unknown or no number; take the table as it was written"
             ) from None
         expected = (len(where.components), dependence.count)
         if coefficients.shape != expected or not np.isfinite(coefficients).all():
             raise InputError(
-                f"effect {UNLISTED!r}: coefficients have shape {coefficients.shape}; give {expected[0]} × {expected[1]} "
-                "numbers, a row for each of the series"
+                f"effect {UNLISTED!r}: coefficients have shape {coefficients.shape}; give {expected[0]} × "
+                f"{expected[1]} numbers, a row for each of the series"
             )
         return cls(where, dependence, str(parameters.get("pattern", "all")), coefficients.ravel())
 

@@ -11,8 +11,17 @@ import tomli_w
 
 from gfimu import AccelerometerArray, InputError
 from gfimu.diagnosis import LocatedTerm, dependences
-from gfimu.model import LocatedEffect, RigState, Wave, channel_place, dependence_of, rig_places
-from gfimu.model.located.dependences import ACCELERATION, FORCES, Mode
+from gfimu.model import (
+    ACCELERATION,
+    FORCES,
+    LocatedEffect,
+    Mode,
+    RigState,
+    Wave,
+    channel_place,
+    dependence_of,
+    rig_places,
+)
 from sim.effects import make_effect
 from sim.scenarios import Scenario
 from sim.simulation import simulate
