@@ -166,7 +166,8 @@ def _headline(verdict: str, causes: Sequence[NamedCause], unexplained: Unexplain
         by = next((cause.would_be_separated_by for cause in contested if cause.would_be_separated_by), "")
         which = _listed([cause.effect for cause in contested])
         return f"The simulation is wrong, but these data do not separate {which}; {by} would."
-    return f"The simulation is wrong in a way that nothing in the library explains: {unexplained.signature}."
+    text = "The simulation is wrong in a way that nothing in the library explains"
+    return f"{text}." if any(cause.unlisted is not None for cause in causes) else f"{text}: {unexplained.signature}."
 
 
 def _residue_sentence(scale: float) -> str:
