@@ -74,7 +74,10 @@ class Steps:
         """Return the same with located terms beside the causes of the library and instead of them."""
         self.stage = STAGES[2]
         self._report(0.65, self.stage)
-        return replace(understanding, explanation=challenged(understanding.explanation, self._policy))
+        try:
+            return replace(understanding, explanation=challenged(understanding.explanation, self._policy))
+        except np.linalg.LinAlgError:  # without a solution there is nothing to compare
+            return understanding
 
     def verdict(self, understanding: Understanding) -> Diagnosis:
         """Return the verdict on what a search found."""

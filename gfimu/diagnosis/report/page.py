@@ -27,6 +27,7 @@ from gfimu.diagnosis.report.plain_words import (
     story,
     summary,
     three_digits,
+    unexplained,
 )
 from gfimu.diagnosis.report.rig import DrawnRig
 from gfimu.diagnosis.report.zooming import dependence_plot, residual_plot, spectrum_plot
@@ -110,7 +111,7 @@ def _content(diagnosis: Diagnosis, rig: DrawnRig) -> Mapping[str, Any]:
         "figures_of_merit": _figures_of_merit(diagnosis),
         "causes": [_cause(diagnosis, cause) for cause in diagnosis.causes if cause.unlisted is None],
         "located": [_located(cause, array) for cause in diagnosis.causes if cause.unlisted is not None],
-        "unexplained": diagnosis.unexplained,
+        "unexplained": unexplained(diagnosis),
         "rivals": diagnosis.rivals,
         "gain": diagnosis.gain,
         "gain_rows": gain_rows(diagnosis),

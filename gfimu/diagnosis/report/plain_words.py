@@ -29,6 +29,7 @@ __all__ = [
     "story",
     "summary",
     "three_digits",
+    "unexplained",
 ]
 
 _OF_A_CALIBRATION = frozenset({"bias", "scale_factor", "misalignment", "cross_axis"})
@@ -91,11 +92,10 @@ def headline(diagnosis: Diagnosis) -> str:
 
 def _of_unknown(diagnosis: Diagnosis, found: list[str], nameless: list[str]) -> str:
     """Return the headline of an unknown verdict, given the causes that were found beside it in words."""
-    unexplained = diagnosis.unexplained
     if diagnosis.interrupted:
         return diagnosis.sentences[0]
-    if unexplained.mistake:
-        return f"The files do not fit these data: {unexplained.mistake}."
+    if diagnosis.unexplained.mistake:
+        return f"The files do not fit these data: {diagnosis.unexplained.mistake}."
     if nameless:
         text = f"is wrong that has no name in the library: {nameless[0]}."
         return f"Found: {_joined(found)}. Something else {text}" if found else f"Something {text}"
@@ -143,14 +143,22 @@ def story(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict == "nothing_found":
         return text + "No cause in the library, and no pattern of any other kind, predicts the data better than chance."
     parts = [_put_in(diagnosis), _on_unseen_data(diagnosis), _in_library(diagnosis)]
-    if diagnosis.unexplained.significant and not diagnosis.interrupted:
+    rest = unexplained(diagnosis)
+    if rest and not diagnosis.interrupted:
         size = "" if diagnosis.verdict == "unknown" else f" ({diagnosis.residual.left_in_words})"
-        parts.append(f"Left unexplained{size}: {diagnosis.unexplained.signature}. ")
+        parts.append(f"Left unexplained{size}: {rest}. ")
     level = diagnosis.noise.bias_instability_largest_m_s2 or 0.0
     if level > 0.0:
         name = diagnosis.noise.bias_instability_largest_channel
         parts.append(f"The largest bias instability is that of {name}, {level / STANDARD_GRAVITY * 1e3:.2g} mg. ")
     return (text + "".join(parts)).strip()
+
+
+def unexplained(diagnosis: Diagnosis) -> str:
+    """Return what neither a name nor a described function explains; empty where nothing significant is left."""
+    described = {cause.why for cause in diagnosis.causes if cause.unlisted is not None}
+    found = diagnosis.unexplained
+    return "; ".join(part for part in found.signature.split("; ") if part not in described) if found.significant else ""
 
 
 def _put_in(diagnosis: Diagnosis) -> str:

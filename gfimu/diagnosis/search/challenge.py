@@ -33,15 +33,12 @@ class Challenged:
 
     Parameters
     ----------
-    stretches : tuple of Stretch
-        The data.
     best : Fit
         The most probable set, under the noise that it leaves.
     rivals : tuple of Fit
         Other sets with located terms, each under its own noise, best first.
     """
 
-    stretches: tuple[Stretch, ...]
     best: Fit
     rivals: tuple[Fit, ...]
 
@@ -57,6 +54,11 @@ def challenged(explanation: Explanation, policy: Policy) -> Explanation:
         What the search of the library ended with. One of a free body stays as it is.
     policy : Policy
         Thresholds of `challenge`.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If what the causes leave can't be solved for.
     """
     stretches, best = explanation.stretches, explanation.best
     if isinstance(stretches[0], BodyStretch):
@@ -131,7 +133,7 @@ def challenge(stretches: Sequence[Stretch], point: Point, policy: Policy) -> Cha
             break
         leading = max((*grown, *others), key=lambda one: one.log_posterior)
     rivals = sorted((one for one in settled.values() if one is not leading), key=lambda one: -one.log_posterior)
-    return Challenged(tuple(stretches), leading, tuple(rivals))
+    return Challenged(leading, tuple(rivals))
 
 
 def _gains(one: Fit, other: Fit) -> float:

@@ -130,7 +130,7 @@ def _function(cause: Cause, term: LocatedTerm, state: RigState) -> tuple[Functio
     spread = basis[rows] @ mixing  # (rows, k)
     std = np.sqrt(np.maximum(np.einsum("nk,kl,nl->n", spread, cause.covariance, spread), 0.0))
     table = FunctionTable(_rounded(x[rows]), _rounded(values[largest, rows]), _rounded(std), of.unit, term.where.unit)
-    return table, f" ({size} at {x[at]:.3g} {of.unit})"
+    return table, f" ({size} at {_minus(f'{x[at]:.3g}')} {of.unit})"
 
 
 def _rounded(values: _Floats) -> tuple[float, ...]:
@@ -140,8 +140,12 @@ def _rounded(values: _Floats) -> tuple[float, ...]:
 def _amount(value: float, unit: str) -> str:
     """Return a value with its unit as people read it."""
     if unit == "1":
-        return f"{100.0 * value:+.2g} %"
+        return _minus(f"{100.0 * value:+.2g} %")
     for factor, name in ((1e3, "m"), (1e6, "µ")):  # numerical
         if abs(value) * factor >= 1.0 and abs(value) < 0.1 and unit in ("rad", "m", "s"):  # numerical
-            return f"{factor * value:+.3g} {name}{unit}"
-    return f"{value:+.3g} {unit}"
+            return _minus(f"{factor * value:+.3g} {name}{unit}")
+    return _minus(f"{value:+.3g} {unit}")
+
+
+def _minus(text: str) -> str:
+    return text.replace("-", "−")

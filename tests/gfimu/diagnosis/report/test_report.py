@@ -152,6 +152,7 @@ def test_each_verdict_has_its_own_words(pages):
     assert "remounted on its side" in words_of(pages["ambiguous"])
     assert "Something is wrong that has no name in the library" in words_of(pages["unknown"])
     assert "The reference reads otherwise than the table turns" in words_of(pages["unknown"])
+    assert "nexplained" not in words_of(pages["unknown"])  # what a function describes is not left
     calm = words_of(pages["nothing_found"])
     assert "Nothing is wrong with the simulation that this recording could show." in calm
     assert "None named." in calm
