@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -11,17 +10,15 @@ from scipy.signal import cont2discrete, lfilter
 
 from gfimu.array.array import AccelerometerArray
 from gfimu.model.parameter_units import NUMBER, RATIO
-from gfimu.model.world_model import SpinState, Whitened
+from gfimu.model.world_model import SpinState
 from sim.effects.base import Effect, Pattern, Size, chip_patterns
 from sim.effects.low_pass import low_pass
-from sim.effects.scans import peaks
 from sim.world import SampleContext, World
 
 __all__ = ["BearingShake", "BenchSway", "ChipLag", "TachoLag"]
 
 _LEAST_RATIO, _MOST_RATIO = 0.2, 20.0  # cycles per revolution
 _RARE = 30.0  # times rarer than the effects that every rig may have, by choice
-_SWAYS, _SWAY_DAMPING = np.geomspace(1.0, 20.0, 24), 0.05  # Hz and 1: modes of a bench to look at
 _GRID = 2e-3  # s, on which a mode is simulated
 
 
@@ -147,11 +144,6 @@ class BearingShake(Effect):
         return ({"order": 7.3},)
 
     @classmethod
-    def scan(cls, left, duration, sample_rate):  # type: ignore[no-untyped-def]
-        """Return the strongest orders, whole or not, of a vertical acceleration."""
-        return shake_orders(left, 2)
-
-    @classmethod
     def from_sizes(cls, array, values, shape) -> Effect:  # type: ignore[no-untyped-def]
         """Turn sine and cosine into amplitude and phase."""
         sine, cosine = (float(v) for v in values)
@@ -178,39 +170,6 @@ class BearingShake(Effect):
             return np.outer(up, [0.0, 0.0, 1.0])
 
         return world.changed(shakes=(*world.shakes, shake))
-
-
-def shake_orders(left: Sequence[Whitened], count: int) -> tuple[list[dict[str, float]], float]:
-    """Return the strongest orders of a vertical acceleration of the whole array in proportion to the rate."""
-    turned = max(float(np.ptp(one.state.angle)) for one in left)
-    step = np.pi / max(turned, 2 * np.pi)  # half of what a run of so many turns resolves
-    orders = np.arange(_LEAST_RATIO, _MOST_RATIO, step)
-    power, energy = np.zeros(len(orders)), 1e-30
-    for one in left:
-        up = one.array.axes[:, 2]
-        speed = np.abs(one.state.rate)
-        score = (one.residual[:, :-1] @ up) * speed
-        energy += float(np.sum(speed**2) * np.sum(up**2 * one.weights[:-1]))
-        power += np.abs(_along_angle(one.state.angle, score, orders)) ** 2
-    best = peaks(power / energy, count, apart=4)
-    return [{"order": float(orders[place])} for place in best], float(len(orders)) / 4.0
-
-
-def _along_angle(
-    angle: NDArray[np.float64], score: NDArray[np.float64], orders: NDArray[np.float64]
-) -> NDArray[np.complex128]:
-    """Return Σ score · exp(i · order · angle) at evenly spaced orders, by a transform of the score binned by angle."""
-    bins = 2 * np.pi / (8.0 * orders[-1])
-    place = (angle - angle.min()) / bins
-    low = place.astype(np.intp)
-    series = np.zeros(low.max() + 2)
-    np.add.at(series, low, score * (1.0 - (place - low)))
-    np.add.at(series, low + 1, score * (place - low))
-    step = orders[1] - orders[0]
-    length = max(round(2 * np.pi / (bins * step)), len(series))
-    spectrum = np.fft.fft(series, length)
-    at = np.round(orders * bins / (2 * np.pi) * length).astype(np.intp)
-    return np.asarray(spectrum[at])
 
 
 class BenchSway(Effect):
@@ -252,11 +211,6 @@ class BenchSway(Effect):
         """Return one mode; the scan over frequencies finds it."""
         return ({"frequency_hz": 5.0, "damping_ratio": 0.05},)
 
-    @classmethod
-    def scan(cls, left, duration, sample_rate):  # type: ignore[no-untyped-def]
-        """Return the modes that follow the horizontal motion of the residual best."""
-        return sway_shapes(left, 2)
-
     @property
     def memory_s(self) -> float:
         """Return how long it takes the mode to decay to a three-hundredth."""
@@ -274,26 +228,6 @@ class BenchSway(Effect):
             return np.stack([x, y, np.zeros_like(x)], axis=-1)
 
         return world.changed(shakes=(*world.shakes, shake))
-
-
-def sway_shapes(left: Sequence[Whitened], count: int) -> tuple[list[dict[str, float]], float]:
-    """Return the modes of a bench whose sway under a rotating unbalance follows a residual best."""
-    power, energy = np.zeros(len(_SWAYS)), np.full(len(_SWAYS), 1e-30)
-    for one in left:
-        across = one.array.axes[:, :2]
-        x, y = (one.residual[:, :-1] @ across).T  # score of an acceleration in the turning frame
-        cos, sin = np.cos(one.state.angle), np.sin(one.state.angle)
-        score = np.stack([cos * x - sin * y, sin * x + cos * y], axis=-1)  # in the room
-        weight = 0.5 * float(np.sum(across**2 * one.weights[:-1, None]))
-        forces = _unbalance(one.state)
-        for place, frequency in enumerate(_SWAYS):
-            sway = _mode_acceleration(forces, one.t, 2 * np.pi * frequency, _SWAY_DAMPING)
-            power[place] += float(np.sum((sway.T @ score) ** 2))
-            energy[place] += weight * float(np.mean(np.sum(sway**2, axis=0)))
-    best = peaks(power / energy, count)
-    return [{"frequency_hz": float(_SWAYS[place]), "damping_ratio": _SWAY_DAMPING} for place in best], float(
-        len(_SWAYS)
-    )
 
 
 def _unbalance(spin: SpinState) -> NDArray[np.float64]:

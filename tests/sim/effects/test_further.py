@@ -8,7 +8,6 @@ from gfimu import AccelerometerArray, InputError
 from gfimu.base import find_model
 from sim import SpinState, forward, prescribed_readings
 from sim.effects import EFFECTS, FURTHER_EFFECTS, SIMULATED_EFFECTS, make_effect
-from sim.effects.rig import shake_orders, sway_shapes
 from sim.scenarios import Scenario
 from sim.trials import random_profile
 from sim.twin import Twin
@@ -106,33 +105,8 @@ def test_a_bench_far_above_its_mode_sways_as_its_unbalance_turns():
     assert not shaken[:, 1:].any()
 
 
-def test_a_scan_finds_the_order_of_a_shake():
-    channels, _ = changes(make_effect("bearing_shake", {"amplitude_m_s2_per_rad_s": 2e-3, "order": 7.31}))
-
-    class Left:
-        residual = np.column_stack([channels, np.zeros(len(T))])
-        weights = np.ones(13)
-        t, state, array = T, MOTION.at(T), ARRAY
-
-    shapes, looks = shake_orders([Left], 2)
-    assert shapes[0]["order"] == pytest.approx(7.31, abs=0.02)
-    assert looks > 100
-
-
 def test_names_are_new():
     assert not set(FURTHER) & set(EFFECTS)
-
-
-def test_a_scan_finds_the_mode_of_a_bench():
-    channels, _ = changes(make_effect("bench_sway", {"y_sine_m": 1e-3, "frequency_hz": 4.0, "damping_ratio": 0.06}))
-
-    class Left:
-        residual = np.column_stack([channels, np.zeros(len(T))])
-        weights = np.ones(13)
-        t, state, array = T, MOTION.at(T), ARRAY
-
-    shapes, _ = sway_shapes([Left], 2)
-    assert shapes[0]["frequency_hz"] == pytest.approx(4.0, rel=0.1)
 
 
 def test_a_tumbling_body_has_no_spin_that_an_effect_could_go_with(tmp_path):
