@@ -7,6 +7,7 @@ these: they win where they serve, as they have fewer coefficients, and they extr
 
 from __future__ import annotations
 
+import math
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
@@ -660,16 +661,20 @@ class OfReading(Dependence):
         return np.stack([self._curve.at(mine) for mine in readings])
 
 
+_FEWEST, _MOST = 4, 320  # numerical: functions of a dependence that a file may have
 _MADE: tuple[tuple[str, Callable[[re.Match[str], Mapping[str, Any]], Dependence]], ...] = (
     (r"f\((\w+), (\w+)\)", lambda m, n: Product(_curve(m[1], n["first"]), _curve(m[2], n["second"]))),
-    (r"f\(y\)|y\^([23])", lambda m, n: OfReading(float(n["most"]), int(m[1] or 0))),
+    (r"f\(y\)|y\^([23])", lambda m, n: OfReading(_positive(n, "most"), int(m[1] or 0))),
     (r"f\((\w+)\)", lambda m, n: _curve(m[1], n)),
-    (r"revolution.*", lambda m, n: Revolution(_one_of(m[0], _ENVELOPES), float(n["scale"]), int(n["harmonics"]))),
-    (r"order .*", lambda m, n: Wave(float(n["cycles"]), 1.0, fastest=float(n["fastest"]))),
-    (r"memory of (.*)", lambda m, n: Memory(_regressor(m[1]), float(n["scale"]))),
-    (r"(\w+) lagging", lambda m, n: LowPassed(_regressor(m[1]), float(n["first"]), float(n["scale"]))),
+    (
+        r"revolution.*",
+        lambda m, n: Revolution(_one_of(m[0], _ENVELOPES), _positive(n, "scale"), _count(n["harmonics"])),
+    ),
+    (r"order .*", lambda m, n: Wave(_positive(n, "cycles"), 1.0, fastest=_finite(n, "fastest"))),
+    (r"memory of (.*)", lambda m, n: Memory(_regressor(m[1]), _positive(n, "scale"))),
+    (r"(\w+) lagging", lambda m, n: LowPassed(_regressor(m[1]), _finite(n, "first"), _positive(n, "scale"))),
     (r"mode at .* of (.*)", lambda m, n: _mode(_regressor(m[1]), n)),
-    (r".*", lambda m, n: Form(_one_of(m[0], _FORMS), float(n["scale"]), float(n["first"]))),
+    (r".*", lambda m, n: Form(_one_of(m[0], _FORMS), _positive(n, "scale"), _finite(n, "first"))),
 )
 """Patterns of names, and what makes the dependence from its name and its numbers."""
 
@@ -698,10 +703,34 @@ def _regressor(name: str) -> Regressor:
 
 
 def _curve(name: str, numbers: Mapping[str, Any]) -> Curve:
-    low, high, warp = (float(numbers[key]) for key in ("low", "high", "warp"))
-    return Curve(_regressor(name), low, high, int(numbers["functions"]), warp=warp)
+    low, high, warp = (_finite(numbers, key) for key in ("low", "high", "warp"))
+    return Curve(_regressor(name), low, high, _count(numbers["functions"]), warp=warp)
+
+
+def _count(value: Any) -> int:
+    count = int(value)
+    if not _FEWEST <= count <= _MOST:
+        raise ValueError(f"{count} functions, not {_FEWEST} to {_MOST},")
+    return count
 
 
 def _mode(regressor: Regressor, numbers: Mapping[str, Any]) -> Mode:
-    scale, frequency, damping = (float(numbers[key]) for key in ("scale", "frequency_hz", "damping"))
-    return Mode(regressor, scale, frequency, tuple(int(one) for one in numbers["outputs"]), damping)
+    scale, frequency, damping = (_positive(numbers, key) for key in ("scale", "frequency_hz", "damping"))
+    outputs = tuple(int(one) for one in numbers["outputs"])
+    if not outputs or not set(outputs) <= {0, 1, 2}:
+        raise ValueError(f"outputs = {outputs}")
+    return Mode(regressor, scale, frequency, outputs, damping)
+
+
+def _finite(numbers: Mapping[str, Any], key: str) -> float:
+    value = float(numbers[key])
+    if not math.isfinite(value):
+        raise ValueError(f"{key} = {value}")
+    return value
+
+
+def _positive(numbers: Mapping[str, Any], key: str) -> float:
+    value = _finite(numbers, key)
+    if not value > 0.0:
+        raise ValueError(f"{key} = {value}")
+    return value

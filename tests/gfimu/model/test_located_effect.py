@@ -103,6 +103,20 @@ GOOD = effect_at(OFFSETS, EVERY["omega^2"], "own").parameters
         ({"series": ["a99", "a11"]}, "effect 'unlisted': .*a99"),
         ({"numbers": {"scale": 1.0}}, "effect 'unlisted': 'first' is missing"),
         ({"numbers": {"scale": "large", "first": 0.0}}, "effect 'unlisted': .*large"),
+        (
+            {"dependence": "f(omega)", "numbers": {"low": 0, "high": 1, "warp": 0, "functions": 10**9}},
+            "1000000000 functions",
+        ),
+        ({"dependence": "revolution", "numbers": {"scale": 1.0, "harmonics": -3}}, "-3 functions, not 4 to 320"),
+        ({"numbers": {"scale": 0.0, "first": 0.0}}, "scale = 0.0"),
+        ({"numbers": {"scale": 1.0, "first": float("inf")}}, "first = inf"),
+        (
+            {
+                "dependence": "mode at 5 Hz of alpha",
+                "numbers": {"scale": 1.0, "frequency_hz": 5.0, "damping": 0.1, "outputs": [7]},
+            },
+            r"outputs = \(7,\)",
+        ),
         ({"coefficients": [[1.0]]}, r"coefficients have shape \(1, 1\); give 2 × 1 numbers"),
         ({"coefficients": [[1.0], [float("nan")]]}, "coefficients have shape"),
         ({"coefficients": "none"}, "effect 'unlisted'"),
