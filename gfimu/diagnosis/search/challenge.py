@@ -112,14 +112,12 @@ def challenge(stretches: Sequence[Stretch], point: Point, policy: Policy) -> Cha
     policy : Policy
         Thresholds ``cause_odds``, ``extra_odds``, ``close``, ``inexactness`` and ``worth_a_search``.
     """
-    few = replace(policy, steps=FEW)
-    best, nothing = fit(stretches, point, few), fit(stretches, replace(point, causes=()), few)
-    settled = {best.key: _settled(stretches, best, policy)}
-    leading = settled[best.key]
+    best, nothing = (fit(stretches, replace(point, causes=some), policy) for some in (point.causes, ()))
+    leading = max(best, _settled(stretches, best, policy), key=lambda one: one.log_posterior)
+    settled = {best.key: leading}
     for _ in range(LOCATED.terms):
-        removed = max(nothing.objective - leading.objective, 0.0)
-        needed = max(policy.extra_odds, policy.inexactness * removed) if leading.causes else policy.cause_odds
         fewer = _fewer(stretches, leading, policy)
+        needed = _needed(leading, fewer, nothing, policy)
         tried = _tried(stretches, leading, fewer, needed, policy)
         for one in tried:
             if one.key not in settled:
@@ -134,6 +132,16 @@ def challenge(stretches: Sequence[Stretch], point: Point, policy: Policy) -> Cha
         leading = max((*grown, *others), key=lambda one: one.log_posterior)
     rivals = sorted((one for one in settled.values() if one is not leading), key=lambda one: -one.log_posterior)
     return Challenged(leading, tuple(rivals))
+
+
+def _needed(leading: Fit, fewer: Sequence[Fit], nothing: Fit, policy: Policy) -> float:
+    """Return the log odds that a term needs beside a set: more than what its causes leave by their inexactness."""
+    if not leading.causes:
+        return policy.cause_odds
+    removed = max(nothing.objective - leading.objective, 0.0)
+    lost = {key: _gains(leading, one) for one in fewer if len(key := leading.key - one.key) == 1}
+    rough = sum(cause.family.inexactness * max(lost.get(frozenset({cause.key}), 0.0), 0.0) for cause in leading.causes)
+    return max(policy.extra_odds + rough, policy.inexactness * removed)
 
 
 def _gains(one: Fit, other: Fit) -> float:

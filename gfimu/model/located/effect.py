@@ -19,7 +19,7 @@ __all__ = ["OF_REFERENCE", "UNLISTED", "LocatedEffect", "derivatives"]
 _Floats = NDArray[np.float64]
 UNLISTED = "unlisted"
 """The word of the contract for an effect without a name."""
-OF_REFERENCE = ("reads", "late", "turns")
+OF_REFERENCE = ("reads", "late", "turns", "twists")
 """What an error is that changes the reference."""
 
 

@@ -6,6 +6,7 @@ specific force of gravity and F that of the chip, all in that frame, and e′ a 
     the reference reads φ more:    Ω + φ
     the array moves by φ e:        a·(φ̈ e + 2ω φ̇ z×e + α φ z×e + ω² φ z×(z×e))
     the array leans by φ e:        the same of e × r, and φ (e × a)·F
+    the array twists by φ:         what the drive moves is the array, so the reference reads φ̇ less
     the array vibrates along e:    a·e φ
     its arms stretch by φ:         the same of the part of r across the axis
     the bench shakes:              a·e′ φ
@@ -106,6 +107,9 @@ def rig_places(*, is_angle: bool, has_geometry: bool = True) -> dict[str, Place]
         Place("clock", "late", "the reference is late", "s", usual.late_s, x, late),
         Place("motion", "turns", "the table turns otherwise than its drive", "rad", usual.turns_rad, x, turns),
         Place("array", "leans", "the array leans on the table", "rad", usual.leans_rad, xy, _leans),
+        Place(
+            "array", "twists", "the array twists on the table", "rad", usual.turns_rad, x, partial(_twists, is_angle)
+        ),
         Place("array", "moves", "the array moves on the table", "m", usual.moves_m, xyz, _moves),
         Place("array", "stretches", "the array stretches away from the axis", "1", usual.ratio, x, _stretches),
         Place("array", "vibrates", "the array vibrates with the table", "m/s²", usual.shakes_m_s2, xyz, _vibrates),
@@ -192,6 +196,11 @@ def _turns(is_angle: bool, state: RigState) -> list[Operator]:
     by_acceleration = np.tile(_along(axes, across), (len(state.t), 1))
     of_angle = _observed(np.zeros_like(by_rate), float(is_angle))
     return [Operator(of_angle, _observed(by_rate, float(not is_angle)), _observed(by_acceleration))]
+
+
+def _twists(is_angle: bool, state: RigState) -> list[Operator]:
+    read = _observed(np.zeros_like(state.readings), -1.0)
+    return [Operator(read) if is_angle else Operator(None, read)]
 
 
 def _moves(state: RigState) -> list[Operator]:

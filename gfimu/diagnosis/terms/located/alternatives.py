@@ -91,7 +91,7 @@ def _of_temperature(states: Sequence[RigState]) -> list[Dependence]:
 
 _OF_REFERENCE = (
     *("1", "f(omega)", "f(alpha)", "f(omega, alpha)", "f(theta)", "revolution", "revolution |omega|"),
-    *("revolution omega", "f(t)", "memory of alpha", "omega", "omega^2", "omega^3", "|omega|"),
+    *("revolution omega", "memory of alpha", "omega", "omega^2", "omega^3", "|omega|"),
     *("omega|omega|", "|alpha|", "alpha omega", "theta"),
 )
 _OF_RIG = (
@@ -121,8 +121,8 @@ def rig_terms(states: Sequence[RigState], every: dict[str, Dependence], *, is_an
         if name in every
     ]
     displacement, acceleration = (0,), (2,)
-    followed = dict.fromkeys(("leans", "moves", "tilts"), displacement)
-    for what, outputs in (followed | {"reads": (0, 1, 2), "shakes": acceleration, "heaves": acceleration}).items():
+    followed = dict.fromkeys(("twists", "leans", "moves", "tilts"), displacement)
+    for what, outputs in (followed | {"shakes": acceleration, "heaves": acceleration}).items():
         if what not in places:
             continue
         regressors = FORCES if places[what].name == "bench" else (ACCELERATION, RATE_SQUARED)
