@@ -279,17 +279,27 @@ def channels(
         for chip, times in enumerate(world.chip_times(t).T):
             mine = world.array.chip_of_channel == chip
             readings[:, mine] = _mechanical(world, motion, times, geometry.of(mine))
-    warm = np.full(len(t), world.temperature) if temperature is None else temperature
-    return world.sense(readings, SampleContext(t, spin, warm))
+    return world.sense(readings, SampleContext(t, spin, _warm(world, t, temperature)))
 
 
-def reference(world: World, motion: SpinMotion, t: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Noise-free reading of the tachometer of a world at reference times, shape (n,), rad/s."""
+def _warm(world: World, t: NDArray[np.float64], temperature: NDArray[np.float64] | None) -> NDArray[np.float64]:
+    return np.full(len(t), world.temperature) if temperature is None else temperature
+
+
+def reference(
+    world: World, motion: SpinMotion, t: NDArray[np.float64], temperature: NDArray[np.float64] | None = None
+) -> NDArray[np.float64]:
+    """Noise-free reading of the tachometer of a world at reference times, shape (n,), rad/s.
+
+    ``temperature`` is the board's, °C, where it is recorded.
+    """
     for step in world.motion_steps:
         motion = step(motion, t)
     times = t - world.tacho_delay
-    spin = motion.at(times)
-    reading = spin.rate
+    context = SampleContext(times, motion.at(times), _warm(world, t, temperature))
+    reading = context.spin.rate
     for change in world.reference_steps:
-        reading = change(reading, spin, times)
+        reading = change(reading, context.spin, times)
+    for error in world.reference_errors:
+        reading = error(reading, context)
     return reading

@@ -166,7 +166,7 @@ class Ride:
             chance = np.random.default_rng([self.seed, 1])
             clipped = np.clip(t, 0.0, self.duration)
             table = _spin(self.scenario.motion)
-            tacho = forward.reference(self.world, table, clipped)
+            tacho = forward.reference(self.world, table, clipped, self.temperature(t))
             for step in self.world.motion_steps:
                 table = step(table, clipped)
             columns["tacho_rad_s"] = tacho + chance.normal(size=len(t)) * self.scenario.reference.tacho_noise_std_rad_s

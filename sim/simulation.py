@@ -78,8 +78,7 @@ def simulate(
         )
 
     t = np.arange(round(run.duration * run.sample_rate)) / run.sample_rate
-    start, final, time_constant = run.temperature
-    temperature = final + (start - final) * np.exp(-t / time_constant)
+    temperature = _temperature(run, t)
     command = run.motion
     if run.driven and not run.free:
         command_end = float(world.chip_times(t[-1:]).max()) + 2 / run.sample_rate
@@ -206,6 +205,11 @@ def _cube_spin(run: Scenario, world: World, t: NDArray[np.float64]) -> world_mod
     return motion.at(t / (1.0 + world.clock_ratio))
 
 
+def _temperature(run: Scenario, t: NDArray[np.float64]) -> NDArray[np.float64]:
+    start, final, time_constant = run.temperature
+    return np.asarray(final + (start - final) * np.exp(-t / time_constant))
+
+
 def _references(
     run: Scenario,
     world: World,
@@ -223,7 +227,8 @@ def _references(
         table = _spin(run.motion)
         for step in world.motion_steps:
             table = step(table, t)
-        tacho = forward.reference(world, _spin(run.motion), t) + rng.normal(size=len(t)) * quality.tacho_noise_std_rad_s
+        tacho = forward.reference(world, _spin(run.motion), t, _temperature(run, t))
+        tacho = tacho + rng.normal(size=len(t)) * quality.tacho_noise_std_rad_s
         columns["tacho_rad_s"] = _stepped(tacho, quality.tacho_resolution_rad_s)
         columns["command_rad_s"] = _spin(command).at(t).rate
         columns["angle_rad"] = _stepped(

@@ -279,7 +279,7 @@ class Twin:
             readings = self._digital(readings, self._effects_with(effects), world, t)
         if reads_place(self):
             return readings, spin.at(t - world.tacho_delay).angle + world.angle_zero
-        return readings, forward.reference(world, spin, t)
+        return readings, forward.reference(world, spin, t, temperature)
 
     def predict_body(
         self,

@@ -202,6 +202,8 @@ class World:
         Changes of the cube's motion against the table's, seen by the cube alone.
     sensing_steps, reference_steps, data_steps : tuple
         Changes at their places in the chain, in order.
+    reference_errors : tuple
+        The same of the reference after these, which may depend on the temperature.
     noise_factor : float
         White noise of the chips against the part's figure.
     bias_walk : float
@@ -233,6 +235,7 @@ class World:
     mount_steps: tuple[MotionStep, ...] = ()
     sensing_steps: tuple[SensingStep, ...] = ()
     reference_steps: tuple[ReferenceStep, ...] = ()
+    reference_errors: tuple[SensingStep, ...] = ()
     data_steps: tuple[DataStep, ...] = ()
     noise_factor: float = 1.0
     bias_walk: float = 0.0

@@ -53,6 +53,7 @@ if TYPE_CHECKING:
     from gfimu.diagnosis.terms.observed import observe
     from gfimu.diagnosis.terms.reach import behind_wiring, disjoint
     from gfimu.diagnosis.time_limit import check_time, limited_to
+    from gfimu.diagnosis.verdict.extension import that_predict
     from gfimu.diagnosis.verdict.likely_mistakes import likely_mistake
     from gfimu.diagnosis.verdict.located import located_cause, of_free_time
     from gfimu.diagnosis.verdict.parts import Located, ReferenceClock

@@ -13,7 +13,7 @@ from gfimu.array.array import AccelerometerArray
 from gfimu.model.located.effect import OF_REFERENCE, UNLISTED, LocatedEffect
 from gfimu.model.located.rig_state import RigState
 from gfimu.model.parameter_units import NAME, NUMBER
-from gfimu.model.world_model import PlacedArray, SpinState
+from gfimu.model.world_model import PlacedArray
 from sim import forward
 from sim.effects.base import Effect, Size
 from sim.world import SampleContext, World
@@ -67,7 +67,7 @@ class Unlisted(Effect):
         at_place = _AtPlace(LocatedEffect.of_parameters(self.parameters, world.array), world)
         return world.changed(
             sensing_steps=(*world.sensing_steps, at_place.sense),
-            reference_steps=(*world.reference_steps, at_place.refer),
+            reference_errors=(*world.reference_errors, at_place.refer),
         )
 
 
@@ -84,21 +84,17 @@ class _AtPlace:
 
     def sense(self, readings: NDArray[np.float64], context: SampleContext) -> NDArray[np.float64]:
         """Return readings (n, c) with the error of the channels."""
-        added = self._added(context.spin, context.t, readings, context.temperature)
+        added = self._added(readings, context)
         return np.asarray(readings + added[:, :-1])
 
-    def refer(self, reading: NDArray[np.float64], spin: SpinState, t: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the reference (n,) with its error; the temperature is not known there."""
-        empty = np.zeros((len(t), self._world.array.n_channels))
-        return np.asarray(reading + self._added(spin, t, empty, None)[:, -1])
+    def refer(self, reading: NDArray[np.float64], context: SampleContext) -> NDArray[np.float64]:
+        """Return the reference (n,) with its error."""
+        empty = np.zeros((len(reading), self._world.array.n_channels))
+        return np.asarray(reading + self._added(empty, context)[:, -1])
 
-    def _added(
-        self,
-        spin: SpinState,
-        t: NDArray[np.float64],
-        readings: NDArray[np.float64],
-        temperature: NDArray[np.float64] | None,
-    ) -> NDArray[np.float64]:
+    def _added(self, readings: NDArray[np.float64], context: SampleContext) -> NDArray[np.float64]:
+        t = context.t
         period = float(np.median(np.diff(t))) if len(t) > 1 else 1.0
-        state = RigState(self._world.since_start(t), spin, readings, temperature, period, self._placed)
+        since = self._world.since_start(t)
+        state = RigState(since, context.spin, readings, context.temperature, period, self._placed)
         return self._effect.added(state)

@@ -20,13 +20,13 @@ from gfimu.diagnosis.data.body.stretch import BodyStretch
 from gfimu.diagnosis.data.prepared_runs import PreparedRuns
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.gauss_newton import Fit
-from gfimu.diagnosis.fit.linear import linearise
 from gfimu.diagnosis.fit.random_walk import Walk
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.explain import Explanation
 from gfimu.diagnosis.search.nuisance_models import Understanding
 from gfimu.diagnosis.terms.cause import Cause, effects_of
 from gfimu.diagnosis.terms.located.term import is_located
+from gfimu.diagnosis.verdict.extension import extension
 from gfimu.diagnosis.verdict.located import located_cause, of_free_time
 from gfimu.diagnosis.verdict.naming import (
     capped,
@@ -42,7 +42,6 @@ from gfimu.diagnosis.verdict.parts import NamedCause, NoiseLevels, Residual, Une
 from gfimu.diagnosis.verdict.undetermined import undetermined, undetermined_sentence
 from gfimu.diagnosis.verdict.verdict import Diagnosis
 from gfimu.diagnosis.verdict.wording import Notes, verdict_sentences
-from gfimu.model.world_model import Effect, WorldModel, is_of_one_recording
 
 __all__ = ["conclude", "is_dominant", "is_unknown", "named_causes"]
 
@@ -240,8 +239,7 @@ def conclude(
         "; ".join(dict.fromkeys(part for part in (refuted, words_of, shown, _loud(loudest, policy)) if part)),
         max(left.log_odds, left.noise_odds),
     )
-    extension, of_time = _extension(explanation, believed, policy, confirmed=gain.of_other_recording)
-    twin = model.extended([*_library_effects(model, found), *_residue(explanation), *extension])
+    extended = extension(explanation, believed, found, prepared, policy, confirmed=gain.of_other_recording)
     expected = model.expected_noise(first.run.output_data_rate)
     body = first.run if isinstance(first, BodyStretch) else None
     noise = NoiseLevels(
@@ -266,9 +264,7 @@ def conclude(
     looked_at = None if policy.free_body else {cause.effect for cause in causes}
     screening = explanation.screening
     open_ones = () if screening is None else undetermined(screening, array, policy.least_share, looked_at)
-    words = (*words, undetermined_sentence(open_ones)) if open_ones else words
-    if of_time:
-        words = (*words, _of_absolute_time(of_time))
+    unsure = (undetermined_sentence(open_ones),) if open_ones else ()
     return Diagnosis(
         verdict=verdict,
         causes=causes,
@@ -276,9 +272,9 @@ def conclude(
         gain=gain,
         unexplained=unexplained,
         rivals=weaker,
-        twin=twin,
+        twin=extended.twin,
         runs=runs,
-        sentences=words,
+        sentences=(*words, *unsure, *extended.sentences),
         noise=noise,
         undetermined=open_ones,
     )
@@ -296,34 +292,6 @@ def _by_contribution(
     }
     small = [one for one in faults if one.effect in sizes and float(sizes[one.effect](one.parameters)) < explained]
     return (*(fault for fault in faults if fault not in small), *inferred, *small)
-
-
-def _extension(
-    explanation: Explanation, believed: Fit, policy: Policy, *, confirmed: bool
-) -> tuple[list[Effect], list[str]]:
-    """Return what extends the twin, and the names of causes of absolute time that do not, as nothing confirms them."""
-    model = explanation.stretches[0].model
-    of_time = [cause for cause in believed.causes if is_of_one_recording(cause.family) and not confirmed]
-    effects = []
-    for cause in believed.causes:
-        if cause in of_time:
-            continue
-        effect = cause.effect(model.array, 0)
-        if is_located(cause):
-            found = located_cause(explanation, believed, cause, policy).unlisted
-            assert found is not None
-            table = {} if found.function is None else {"function": found.function.to_dict()}
-            effect = model.described({**effect.parameters, "text": found.text, **table})
-        effects.append(effect)
-    return effects, [cause.name for cause in of_time]
-
-
-def _of_absolute_time(names: Sequence[str]) -> str:
-    go, are, them = ("goes", "is", "it") if len(names) == 1 else ("go", "are", "them")
-    return (
-        f"{' and '.join(names)} {go} with absolute time and {are} not in the extended twin: another recording has "
-        f"another phase or start, and none confirms {them}."
-    )
 
 
 def _loud(loudest: LoudestChannel, policy: Policy) -> str:
@@ -357,19 +325,6 @@ def _noise_causes(walk: Walk | None, understanding: Understanding, policy: Polic
         why = f"the white noise of all channels is {factor:.2f} times the data sheet's"
         causes.append(NamedCause("noise", {"factor": factor}, {"factor": std}, policy.most_certain, why=why))
     return causes
-
-
-def _library_effects(model: WorldModel, causes: Sequence[NamedCause]) -> list[Effect]:
-    families = model.families()
-    return [families[cause.effect](cause.parameters) for cause in causes if cause.effect in families]
-
-
-def _residue(explanation: Explanation) -> tuple[Effect, ...]:
-    """Return the most probable residue of the calibration as effects; none where none was admitted."""
-    point = explanation.best.point
-    if point.residue is None:
-        return ()
-    return point.residue.effects(explanation.stretches[0], linearise(explanation.stretches, point).residue)
 
 
 def _noise_floor(runs: Sequence[RunView], stretch: Stretch, believed: Fit) -> float:

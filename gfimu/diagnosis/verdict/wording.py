@@ -54,15 +54,19 @@ def verdict_sentences(
     words += [_sentence(cause.why) for cause in causes if cause.unlisted is not None]
     words += _coincidences(verdict, causes)
     if causes:
-        words.append(
-            f"The residual falls from {residual.rms_before:.3g} to {residual.rms_after:.3g} m/s²; "
-            f"the noise alone is {residual.noise_floor:.3g} m/s²."
-        )
+        words.append(f"The residual {_course(residual)} m/s²; the noise alone is {residual.noise_floor:.3g} m/s².")
     words += _held_out(residual, gain)
     words += _left_over(verdict, residual, unexplained, notes.rest)
     words += _noted(notes)
     words += [f"{name} was withdrawn: it did not predict held-out data." for name in withdrawn]
     return tuple(words)
+
+
+def _course(residual: Residual) -> str:
+    before, after = f"{residual.rms_before:.3g}", f"{residual.rms_after:.3g}"
+    if before == after:
+        return f"stays at {after}"
+    return f"{'falls' if residual.rms_after < residual.rms_before else 'rises'} from {before} to {after}"
 
 
 def _coincidences(verdict: str, causes: Sequence[NamedCause]) -> list[str]:

@@ -137,3 +137,14 @@ def test_a_missing_key_is_named(key):
 def test_a_name_that_is_no_dependence_is_an_error():
     with pytest.raises(KeyError):
         dependence_of("f(luck)", {"low": 0.0, "high": 1.0, "warp": 0.0, "functions": 8})
+
+
+@pytest.mark.parametrize("where", [OFFSETS, rig_places(is_angle=False)["reads"]])
+def test_a_twin_predicts_what_goes_with_the_temperature(where):
+    effect = effect_at(where, EVERY["T"])
+    extended = TWIN.extended([TWIN.described(effect.parameters)])
+    warm, cold = (extended.predict(MOTION, T, temperature=some) for some in (WARM, None))
+    plain = TWIN.predict(MOTION, T, temperature=WARM)
+    np.testing.assert_allclose(np.column_stack(warm) - np.column_stack(plain), effect.added(STATE), rtol=0, atol=1e-9)
+    at_rest = effect.added(replace(STATE, temperature=np.full(len(T), 25.0)))
+    np.testing.assert_allclose(np.column_stack(cold) - np.column_stack(plain), at_rest, rtol=0, atol=1e-9)

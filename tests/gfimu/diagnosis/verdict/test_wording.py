@@ -45,6 +45,14 @@ def test_explained():
     )
 
 
+@pytest.mark.parametrize(
+    ("after", "says"), [(0.1, "falls from 0.3 to 0.1"), (0.3001, "stays at 0.3"), (0.5, "rises from 0.3 to 0.5")]
+)
+def test_a_residual_falls_only_where_it_does(after, says):
+    words = told("unknown", [TILT], residual=Residual(0.3, after, 0.1, {}, {}))
+    assert f"The residual {says} m/s²; the noise alone is 0.1 m/s²." in words
+
+
 @pytest.mark.parametrize(("after", "says"), [(0.109, False), (0.112, True)])
 def test_what_is_left_is_told_from_a_tenth_of_the_noise_on(after, says):
     residual = Residual(0.3, after, 0.1, {}, {})

@@ -1,0 +1,134 @@
+"""What a diagnosis extends a twin with, and what of its finds does not enter the twin."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gfimu.diagnosis.data.prepared_runs import PreparedRuns
+from gfimu.diagnosis.data.stretch import NoPredictionError
+from gfimu.diagnosis.fit.gauss_newton import Fit
+from gfimu.diagnosis.fit.learn import predicted_by_reference
+from gfimu.diagnosis.fit.linear import linearise
+from gfimu.diagnosis.policy import Policy
+from gfimu.diagnosis.search.explain import Explanation
+from gfimu.diagnosis.terms.located.term import is_located
+from gfimu.diagnosis.verdict.located import located_cause
+from gfimu.diagnosis.verdict.parts import NamedCause
+from gfimu.model.world_model import Effect, WorldModel, is_of_one_recording
+
+__all__ = ["Extension", "extension", "that_predict"]
+
+_NOT_PREDICTED = (
+    "What has no name is not all in the extended twin: from the reference alone the simulation predicts these data "
+    "better without it."
+)
+
+
+@dataclass(frozen=True)
+class Extension:
+    """An extended twin, and sentences on what of a diagnosis is not in it."""
+
+    twin: WorldModel
+    sentences: tuple[str, ...]
+
+
+def extension(
+    explanation: Explanation,
+    believed: Fit,
+    faults: Sequence[NamedCause],
+    prepared: PreparedRuns,
+    policy: Policy,
+    *,
+    confirmed: bool,
+) -> Extension:
+    """Extend the twin of an explanation.
+
+    Causes of absolute time stay out where nothing confirms them, and so do errors without a name with which the
+    reference alone predicts the runs worse.
+
+    Parameters
+    ----------
+    explanation : Explanation
+        What the search found.
+    believed : Fit
+        The causes that extend the twin.
+    faults : sequence of NamedCause
+        Faults of the samples, and causes that are noise.
+    prepared : PreparedRuns
+        The runs.
+    policy : Policy
+        Thresholds.
+    confirmed : bool
+        Whether another recording confirms the causes.
+    """
+    model = explanation.stretches[0].model
+    of_time = [cause for cause in believed.causes if is_of_one_recording(cause.family) and not confirmed]
+    named, described = [], []
+    for cause in believed.causes:
+        if cause in of_time:
+            continue
+        effect = cause.effect(model.array, 0)
+        if is_located(cause):
+            found = located_cause(explanation, believed, cause, policy).unlisted
+            assert found is not None
+            table = {} if found.function is None else {"function": found.function.to_dict()}
+            described.append(model.described({**effect.parameters, "text": found.text, **table}))
+        else:
+            named.append(effect)
+    twin = model.extended([*_library_effects(model, faults), *_residue(explanation), *named])
+    kept = that_predict(twin, described, prepared)
+    sentences = [_of_absolute_time([cause.name for cause in of_time])] if of_time else []
+    if len(kept) < len(described):
+        sentences.append(_NOT_PREDICTED)
+    return Extension(twin.extended(kept), tuple(sentences))
+
+
+def that_predict(twin: WorldModel, described: Sequence[Effect], prepared: PreparedRuns) -> list[Effect]:
+    """Return the errors without a name with which a twin predicts the runs, from their reference alone, best.
+
+    A function of what a reference does not tell is right and yet of no use for another recording, such as many waves
+    per revolution where the reference gives the angle to some degrees, or where a tachometer stands still.
+    """
+
+    def squares(some: Sequence[Effect]) -> float:
+        model = twin.extended(list(some))
+        try:
+            misses = [run.readings - predicted_by_reference(model, run) for run in prepared.runs]
+        except NoPredictionError:
+            return np.inf
+        return sum(float(np.sum(miss[run.valid] ** 2)) for miss, run in zip(misses, prepared.runs, strict=True))
+
+    kept = list(described)
+    least = squares(kept) if kept else 0.0
+    while kept:
+        fewer = [[other for other in kept if other is not one] for one in kept]
+        sums = [squares(some) for some in fewer]
+        if min(sums) >= least:
+            break
+        least = min(sums)
+        kept = fewer[sums.index(least)]
+    return kept
+
+
+def _of_absolute_time(names: Sequence[str]) -> str:
+    go, are, them = ("goes", "is", "it") if len(names) == 1 else ("go", "are", "them")
+    return (
+        f"{' and '.join(names)} {go} with absolute time and {are} not in the extended twin: another recording has "
+        f"another phase or start, and none confirms {them}."
+    )
+
+
+def _library_effects(model: WorldModel, causes: Sequence[NamedCause]) -> list[Effect]:
+    families = model.families()
+    return [families[cause.effect](cause.parameters) for cause in causes if cause.effect in families]
+
+
+def _residue(explanation: Explanation) -> tuple[Effect, ...]:
+    """Return the most probable residue of the calibration as effects; none where none was admitted."""
+    point = explanation.best.point
+    if point.residue is None:
+        return ()
+    return point.residue.effects(explanation.stretches[0], linearise(explanation.stretches, point).residue)
