@@ -46,4 +46,4 @@ def body_channels(
         readings[:, mine] = rigid
     nothing = np.full(len(t), np.nan)
     warm = np.full(len(t), world.temperature) if temperature is None else temperature
-    return world.sense(readings, SampleContext(t, SpinState(nothing, nothing, nothing), warm))
+    return world.sense(readings, SampleContext(t, SpinState(nothing, nothing, nothing), warm, drive))

@@ -14,7 +14,9 @@ from gfimu.base.errors import InputError
 from gfimu.base.files.model_files import find_model, read_toml, set_key
 from gfimu.base.short_repr import short_repr
 from gfimu.base.units import STANDARD_GRAVITY
-from gfimu.model.located.effect import UNLISTED
+from gfimu.model.located.effect import UNLISTED, LocatedEffect
+from gfimu.model.located.rig_state import RigState
+from gfimu.motion.body_drive import BodyDrive
 from gfimu.motion.earth import EarthRotation
 from sim.chips.adxl345 import SensorSettings
 from sim.effects import NOT_OF_A_CARRIAGE, Effect, apply_effects
@@ -175,6 +177,12 @@ def _refuse_turning(scenario: Scenario, source: str) -> None:
             raise InputError(f"{source}: effect {effect.name}: {NOT_OF_A_CARRIAGE[effect.name]}; leave it out")
 
 
+def _still_body(array: AccelerometerArray) -> RigState:
+    """Return the state of a free body at rest, to try errors on."""
+    t, nothing = np.arange(8.0), np.zeros((8, 3))
+    return RigState.of_body(array, BodyDrive(t, nothing, nothing), t, np.zeros((8, array.n_channels)), t)
+
+
 def _refuse_table_keys(scenario: Scenario, source: str) -> None:
     """Raise for what a free body can't have: a drive, or effects of the table."""
     if scenario.driven:
@@ -185,10 +193,15 @@ def _refuse_table_keys(scenario: Scenario, source: str) -> None:
     nominal = replace(scenario, effects=()).world
     same = ("nod", "stretch", "leans", "shakes", "motion_steps", "mount_steps", "reference_steps")
     moved = ("cube_offset", "mount_rotvec", "axis_rotvec")
-    if (
-        any(one.name == UNLISTED for one in scenario.effects)
-        or any(getattr(world, name) != getattr(nominal, name) for name in same)
-        or any(not np.array_equal(getattr(world, name), getattr(nominal, name)) for name in moved)
+    still = _still_body(scenario.array)
+    for effect in scenario.effects:
+        if effect.name == UNLISTED:
+            try:
+                LocatedEffect.of_parameters(effect.parameters, scenario.array).added(still)
+            except InputError as error:
+                raise InputError(f"{source}: effect {UNLISTED}: {error}; leave it out") from None
+    if any(getattr(world, name) != getattr(nominal, name) for name in same) or any(
+        not np.array_equal(getattr(world, name), getattr(nominal, name)) for name in moved
     ):
         names = ", ".join(effect.name for effect in scenario.effects)
         raise InputError(f"{source}: among the effects {names} some change the table, which a tumbling body has not")

@@ -14,6 +14,7 @@ from gfimu.base.declared import Declared, Table, figure
 from gfimu.base.errors import InputError
 from gfimu.base.version import __version__
 from gfimu.model import world_model
+from gfimu.motion.body_drive import BodyDrive
 from gfimu.recording import Recording
 from gfimu.recording.carried_array import array_metadata
 from sim import forward
@@ -87,7 +88,8 @@ def simulate(
 
     force, body = _rigid_body(run, world, t, progress)
     spin = _nothing(len(t)) if run.free else _cube_spin(run, world, t)
-    force = world.sense(force, SampleContext(t, spin, temperature))
+    drive_of_body = _drive_of_body(body, t, world.gravity) if run.free else None
+    force = world.sense(force, SampleContext(t, spin, temperature, drive_of_body))
     force = force + _walk(force.shape, world.bias_walk / np.sqrt(run.sample_rate), noise_chance)
     readings = sensor.sense(force, temperature, noise_chance, noise_factor=world.noise_factor)
     for step in world.data_steps:
@@ -195,6 +197,12 @@ def _rigid_body(
     true_time = t / (1.0 + world.clock_ratio)
     state = motion.at(true_time)
     return force, state if isinstance(state, BodyState) else cube_state(world, state)
+
+
+def _drive_of_body(body: BodyState, t: NDArray[np.float64], gravity: float) -> BodyDrive:
+    """Return the rate of a free body and its specific force, in its axes."""
+    force = np.einsum("nji,nj->ni", body.rotation, body.acceleration + np.array([0.0, 0.0, gravity]))
+    return BodyDrive(t, body.omega, force)
 
 
 def _cube_spin(run: Scenario, world: World, t: NDArray[np.float64]) -> world_model.SpinState:

@@ -24,6 +24,7 @@ from gfimu.array.turning_axis import TurningAxis
 from gfimu.base.short_repr import short_repr
 from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.model.world_model import SpinState
+from gfimu.motion.body_drive import BodyDrive
 from sim.motions.motion import SpinMotion
 
 __all__ = ["DataStep", "Lean", "MotionStep", "Nod", "ReferenceStep", "SampleContext", "SensingStep", "Shake", "World"]
@@ -44,11 +45,14 @@ class SampleContext:
         Spin of the cube at these times; NaN-filled for a free body.
     temperature : ndarray, shape (n,)
         Board temperature, °C (25 where not recorded).
+    body : BodyDrive, optional
+        Motion of a free body.
     """
 
     t: NDArray[np.float64]
     spin: SpinState
     temperature: NDArray[np.float64]
+    body: BodyDrive | None = None
 
 
 class MotionStep(Protocol):

@@ -11,9 +11,9 @@ from gfimu.base.lazy_names import declared_names
 
 if TYPE_CHECKING:
     from gfimu.model.generic_basis import OF_READING
-    from gfimu.model.located.dependences import ACCELERATION, FORCES, Mode, Wave, dependence_of
+    from gfimu.model.located.dependences import ACCELERATION, FORCES, Mode, VectorForm, Wave, dependence_of
     from gfimu.model.located.effect import LocatedEffect
-    from gfimu.model.located.operators import Operator, channel_place, rig_places
+    from gfimu.model.located.operators import Operator, body_places, channel_place, rig_places
     from gfimu.model.located.rig_state import RigState
     from gfimu.model.located.usual import USUAL
     from gfimu.model.own_rig import load_model

@@ -94,6 +94,11 @@ class _AtPlace:
 
     def _added(self, readings: NDArray[np.float64], context: SampleContext) -> NDArray[np.float64]:
         t = context.t
+        if context.body is not None:
+            since = self._world.since_start(t)
+            array = self._world.array
+            state = RigState.of_body(array, context.body, since, readings, context.temperature)
+            return self._effect.added(state)
         period = float(np.median(np.diff(t))) if len(t) > 1 else 1.0
         since = self._world.since_start(t)
         state = RigState(since, context.spin, readings, context.temperature, period, self._placed)

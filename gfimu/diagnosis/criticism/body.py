@@ -1,4 +1,4 @@
-"""What a free body leaves: functions of its motion and time, a tone, and noise that grows with the motion."""
+"""What a free body leaves: a tone, and noise that grows with the motion."""
 
 from __future__ import annotations
 
@@ -8,17 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
-from gfimu.array.kinematics import omega_products
 from gfimu.diagnosis.criticism.series_tests import SLOWEST_LINE, LackOfFit
 from gfimu.diagnosis.data.body.stretch import BodyStretch
 from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.terms.hand.drive import HandDrive
 from gfimu.diagnosis.terms.hand.noise import BodyNoise
 from gfimu.diagnosis.terms.hand.posterior import HandPosterior
 
-__all__ = ["body_functions", "motion_noise", "tone"]
+__all__ = ["motion_noise", "tone"]
 
-_STEPS = 8  # numerical: parts of a run at whose edges a step is looked for
 _WINDOW = 1024  # numerical: samples in which an oscillator that is not steady is a line
 _NEIGHBOURS = 41  # numerical: frequencies about a line that give its background
 
@@ -41,20 +38,6 @@ def motion_noise(stretches: Sequence[BodyStretch], levels: Sequence[BodyNoise], 
             f"the angular acceleration differs from what the gyro's samples say by {typical:.2g} rad/s² rms in motion"
         )
     return LackOfFit(-np.inf, "; ".join(parts), noise_odds=noise.log_odds)
-
-
-def body_functions(stretch: BodyStretch, drive: HandDrive) -> dict[str, NDArray[np.float64]]:
-    """Return functions of the motion and time at the groups of a stretch, each (m,)."""
-    rate, acceleration = drive.spin.rate_at()
-    speed = np.linalg.norm(rate, axis=1)
-    time = (stretch.run.t - stretch.run.t[0]) / max(stretch.run.duration, 1e-9)
-    found = {f"ω{axis}": rate[:, index] for index, axis in enumerate("xyz")}
-    found |= dict(zip(("ωx²", "ωy²", "ωz²", "ωxωy", "ωxωz", "ωyωz"), omega_products(rate).T, strict=True))
-    found |= {f"dω{axis}/dt": acceleration[:, place] for place, axis in enumerate("xyz")}
-    found |= {"|ω|": speed, "|ω|⁴": speed**4, "the specific force squared": np.sum(drive.spin.force**2, axis=1)}
-    found |= {f"time (a step at {k / _STEPS:.0%} of the run)": np.sign(time - k / _STEPS) for k in range(1, _STEPS)}
-    grouped = stretch.grouped(np.column_stack([*found.values()]))
-    return dict(zip(found, grouped.T, strict=True))
 
 
 def tone(at: HandPosterior, policy: Policy) -> LackOfFit:

@@ -231,6 +231,10 @@ class Stretch:
         motion = self.motion(own, drive)
         return self._state(motion, self.run.t, self.predict(own, drive)[:, :-1], self.run.temperature)
 
+    def observed(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return values at the samples (n, k) as the observations have them: a table's are the samples."""
+        return values
+
     def _state(
         self,
         motion: Spin,

@@ -51,7 +51,7 @@ def challenged(explanation: Explanation, policy: Policy) -> Explanation:
     Parameters
     ----------
     explanation : Explanation
-        What the search of the library ended with. One of a free body stays as it is.
+        What the search of the library ended with.
     policy : Policy
         Thresholds of `challenge`.
 
@@ -61,11 +61,10 @@ def challenged(explanation: Explanation, policy: Policy) -> Explanation:
         If what the causes leave can't be solved for.
     """
     stretches, best = explanation.stretches, explanation.best
-    if isinstance(stretches[0], BodyStretch):
-        return explanation
     chosen = spread_over_runs([stretch.index for stretch in stretches], LOCATED.stretches)
     some = [stretches[place] for place in chosen]
-    some = [replace(one, run=one.run.rows(0, min(len(one.run.t), LOCATED.samples))) for one in some]
+    if not isinstance(some[0], BodyStretch):
+        some = [replace(one, run=one.run.rows(0, min(len(one.run.t), LOCATED.samples))) for one in some]
     found = challenge(some, _of_part(some, chosen, best.point), policy)
     if not any(map(is_located, found.best.causes)):
         others = [
@@ -116,13 +115,15 @@ def challenge(stretches: Sequence[Stretch], point: Point, policy: Policy) -> Cha
     leading = max(best, _settled(stretches, best, policy), key=lambda one: one.log_posterior)
     settled = {best.key: leading}
     for _ in range(LOCATED.terms):
+        if isinstance(stretches[0], BodyStretch):  # whose evidences are of one noise, as long as nothing joins
+            settled = {leading.key: leading}
         fewer = _fewer(stretches, leading, policy)
         needed = _needed(leading, fewer, nothing, policy)
         tried = _tried(stretches, leading, fewer, needed, policy)
         for one in tried:
             if one.key not in settled:
                 try:
-                    settled[one.key] = _settled(stretches, _refined(stretches, one, policy), policy)
+                    settled[one.key] = _compared(stretches, _refined(stretches, one, policy), policy)
                 except np.linalg.LinAlgError:  # what would be learnt leaves nothing that can be solved
                     continue
         grown = [one for one in settled.values() if one.key > leading.key and _gains(one, leading) > needed]
@@ -130,6 +131,8 @@ def challenge(stretches: Sequence[Stretch], point: Point, policy: Policy) -> Cha
         if not grown and not others:
             break
         leading = max((*grown, *others), key=lambda one: one.log_posterior)
+        if isinstance(stretches[0], BodyStretch):
+            leading = _settled(stretches, leading, policy)
     rivals = sorted((one for one in settled.values() if one is not leading), key=lambda one: -one.log_posterior)
     return Challenged(leading, tuple(rivals))
 
@@ -167,11 +170,11 @@ def _tried(
         missed = max(policy.close, policy.inexactness * (one.objective - leading.objective))
         cases.append((leading.key - one.key, _gains(leading, one) - missed))
     screen = LocatedScreen(stretches, leading.point)
-    promised = [
-        (base.log_posterior + leader.log_odds, leader, base)
-        for base, leaders in zip((leading, *fewer), screen.leaders_each(cases), strict=True)
-        for leader in _distinct(leaders)
-    ]
+    promised = []
+    for base, leaders in zip((leading, *fewer), screen.leaders_each(cases), strict=True):
+        shaped = [screen.refined(one, leading.key - base.key) for one in _first_of_each_shape(leaders)]
+        ranked = sorted([*shaped, *leaders], key=lambda one: -one.log_odds)
+        promised += [(base.log_posterior + leader.log_odds, leader, base) for leader in _distinct(ranked)]
     promised.sort(key=lambda one: -one[0])
     fitted: list[Fit] = []
     for _, leader, base in promised[: LOCATED.fitted]:
@@ -207,10 +210,27 @@ def _refined(stretches: Sequence[Stretch], found: Fit, policy: Policy) -> Fit:
     return max([found, *again], key=lambda one: one.log_posterior)
 
 
+def _compared(stretches: Sequence[Stretch], found: Fit, policy: Policy) -> Fit:
+    """Return a fit as sets are compared: under the noise that it leaves, or that of the leading set for a body.
+
+    The evidence of a body is that of a misfit of its noise, and no such evidence compares with that of another one.
+    """
+    return found if isinstance(stretches[0], BodyStretch) else _settled(stretches, found, policy)
+
+
 def _settled(stretches: Sequence[Stretch], found: Fit, policy: Policy) -> Fit:
     """Return a fit under the roughness and the noise that it leaves."""
     point = learn_noise(stretches, learn_roughness(stretches, found.point))
     return fit(stretches, point, replace(policy, steps=FEW))
+
+
+def _first_of_each_shape(leaders: Sequence[Leader]) -> list[Leader]:
+    """Return the best step, wave or mode, of each that has a shape: between those that are tried it may be better."""
+    first: dict[str, Leader] = {}
+    for leader in leaders:
+        if leader.term.dependence.near(1.0):
+            first.setdefault(leader.term.dependence.kind, leader)
+    return list(first.values())
 
 
 def _distinct(leaders: Sequence[Leader]) -> list[Leader]:

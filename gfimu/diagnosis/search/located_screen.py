@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.diagnosis.data.body.stretch import BodyStretch
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.coarse import WHOLE, coarse
 from gfimu.diagnosis.fit.evidence import inverse, log_evidence
@@ -18,7 +19,14 @@ from gfimu.diagnosis.search.waves import wave_terms
 from gfimu.diagnosis.terms.cause import Cause, effects_of
 from gfimu.diagnosis.terms.columns import Columns
 from gfimu.diagnosis.terms.library import cause_columns
-from gfimu.diagnosis.terms.located.alternatives import ChannelTerms, channel_terms, dependences, rig_terms
+from gfimu.diagnosis.terms.located.alternatives import (
+    ChannelTerms,
+    body_dependences,
+    body_terms,
+    channel_terms,
+    dependences,
+    rig_terms,
+)
 from gfimu.diagnosis.terms.located.policy import LOCATED
 from gfimu.diagnosis.terms.located.term import LocatedTerm, located_columns
 from gfimu.model.located.operators import channel_place
@@ -75,7 +83,8 @@ class LocatedScreen:
             cause.key: np.arange(start, stop) for cause, start, stop in zip(point.causes, ends, ends[1:], strict=False)
         }
         most = max(int(1.0 / (LOCATED.averaged_hz * stretches[0].run.sample_period)), 1)
-        self._coarse = [coarse(posterior, most) for posterior in self._posteriors]
+        self._is_body = isinstance(stretches[0], BodyStretch)
+        self._coarse = [(one, WHOLE) if self._is_body else coarse(one, most) for one in self._posteriors]
         self._sizes = np.zeros(len(self._precision))
         for cause in point.causes:
             self._sizes[self._unknowns[cause.key][: len(cause.coordinates)]] = cause.coordinates
@@ -94,23 +103,28 @@ class LocatedScreen:
 
     def leaders_each(self, cases: Sequence[tuple[Key, float]]) -> list[list[Leader]]:
         """Return the same for several cases, each the causes that are left out and the least log odds."""
-        is_angle = reads_place(self._stretches[0].model)
-        every = dependences(self._states)
-        waves, of_channels = wave_terms(self._states, self._posteriors, self._array, is_angle=is_angle)
+        of_rig, of_channels = self._terms()
         found: list[list[Leader]] = [[] for _ in cases]
-        for term, gram, score in self._each((*rig_terms(self._states, every, is_angle=is_angle), *waves)):
+        for term, gram, score in self._each(of_rig):
             for (without, least), leaders in zip(cases, found, strict=True):
                 leaders.extend(self._judged(term, *self._beside(gram, score, without), least))
-        channels = {
-            self._on_each_channel(some): some
-            for some in (*channel_terms(self._states, every, self._array), *of_channels)
-        }
+        channels = {self._on_each_channel(some): some for some in of_channels}
         for whole, gram, score in self._each(channels):
             for (without, least), leaders in zip(cases, found, strict=True):
                 inner, right = self._beside(gram, score, without)
                 for term, mixing in self._patterns(channels[whole]):
                     leaders.extend(self._judged(term, mixing.T @ inner @ mixing, mixing.T @ right, least))
         return [sorted(leaders, key=lambda leader: -leader.log_odds) for leaders in found]
+
+    def _terms(self) -> tuple[list[LocatedTerm], list[ChannelTerms]]:
+        """Return the terms of places in the rig, or on the body, and of channels."""
+        if self._is_body:
+            every = body_dependences(self._states)
+            return body_terms(every), channel_terms(self._states, every, self._array)
+        is_angle, every = reads_place(self._stretches[0].model), dependences(self._states)
+        waves, of_channels = wave_terms(self._states, self._posteriors, self._array, is_angle=is_angle)
+        of_rig = rig_terms(self._states, every, is_angle=is_angle)
+        return [*of_rig, *waves], [*channel_terms(self._states, every, self._array), *of_channels]
 
     def refined(self, leader: Leader, without: Key = frozenset()) -> Leader:
         """Return a leader at the most probable frequency, damping or order nearby."""
@@ -144,9 +158,8 @@ class LocatedScreen:
         for index, (state, present, whole) in enumerate(
             zip(self._states, self._present, self._posteriors, strict=True)
         ):
-            columns = Columns.together(
-                [present, *(located_columns(term, state, whole.observed.weight) for term in terms)]
-            )
+            weight, observed = whole.observed.weight, self._stretches[index].observed
+            columns = Columns.together([present, *(located_columns(term, state, weight, observed) for term in terms)])
             posterior, rows = self._coarse[index] if terms[0].dependence.is_slow else (whole, WHOLE)
             own, right, _ = posterior.products(rows.of_columns(columns))
             gram, score = gram + own, score + right

@@ -79,7 +79,7 @@ def cause_columns(stretch: Stretch, seen: Seen, drive: Nuisance, causes: Sequenc
     for number, cause in enumerate(causes):
         if isinstance(cause.family, LocatedTerm):
             state = stretch.state(present, drive.spin)
-            found.append(located_columns(cause.family, state, seen.weight).mixed(cause.mixing))
+            found.append(located_columns(cause.family, state, seen.weight, stretch.observed).mixed(cause.mixing))
             continue
         count = len(cause.coordinates)
         step = _step(cause, stretch)

@@ -24,6 +24,7 @@ from gfimu.diagnosis.fit.random_walk import Walk
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.explain import Explanation
 from gfimu.diagnosis.search.nuisance_models import Understanding
+from gfimu.diagnosis.search.undetermined import undetermined, undetermined_sentence
 from gfimu.diagnosis.terms.cause import Cause, effects_of
 from gfimu.diagnosis.terms.located.term import is_located
 from gfimu.diagnosis.verdict.extension import extension
@@ -39,7 +40,6 @@ from gfimu.diagnosis.verdict.naming import (
     rival_list,
 )
 from gfimu.diagnosis.verdict.parts import NamedCause, NoiseLevels, Residual, Unexplained
-from gfimu.diagnosis.verdict.undetermined import undetermined, undetermined_sentence
 from gfimu.diagnosis.verdict.verdict import Diagnosis
 from gfimu.diagnosis.verdict.wording import Notes, verdict_sentences
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gfimu.diagnosis.data.body.stretch import BodyStretch
 from gfimu.diagnosis.data.prepared_runs import PreparedRuns
 from gfimu.diagnosis.data.stretch import NoPredictionError
 from gfimu.diagnosis.fit.gauss_newton import Fit
@@ -79,8 +80,10 @@ def extension(
         else:
             named.append(effect)
     twin = model.extended([*_library_effects(model, faults), *_residue(explanation), *named])
-    kept = that_predict(twin, described, prepared)
-    sentences = [_of_absolute_time([cause.name for cause in of_time])] if of_time else []
+    is_body = isinstance(explanation.stretches[0], BodyStretch)  # of which no reference gives the specific force
+    kept = described if is_body else that_predict(twin, described, prepared)
+    names = dict.fromkeys("What has no name" if is_located(cause) else cause.name for cause in of_time)
+    sentences = [_of_absolute_time([*names])] if names else []
     if len(kept) < len(described):
         sentences.append(_NOT_PREDICTED)
     return Extension(twin.extended(kept), tuple(sentences))
@@ -115,8 +118,9 @@ def that_predict(twin: WorldModel, described: Sequence[Effect], prepared: Prepar
 
 def _of_absolute_time(names: Sequence[str]) -> str:
     go, are, them = ("goes", "is", "it") if len(names) == 1 else ("go", "are", "them")
+    every = " and ".join(names)
     return (
-        f"{' and '.join(names)} {go} with absolute time and {are} not in the extended twin: another recording has "
+        f"{every} {go} with absolute time and {are} not in the extended twin: another recording has "
         f"another phase or start, and none confirms {them}."
     )
 

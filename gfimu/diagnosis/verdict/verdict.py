@@ -17,6 +17,7 @@ from gfimu.base.results import Panel, PlottedResult, Series
 from gfimu.base.short_repr import joined
 from gfimu.diagnosis.criticism.gain import Gain
 from gfimu.diagnosis.criticism.views.run_view import RunView
+from gfimu.diagnosis.search.undetermined import Undetermined
 from gfimu.diagnosis.verdict.parts import (
     Interrupted,
     NamedCause,
@@ -27,7 +28,6 @@ from gfimu.diagnosis.verdict.parts import (
     Unexplained,
     is_in_part,
 )
-from gfimu.diagnosis.verdict.undetermined import Undetermined
 from gfimu.model.world_model import WorldModel
 
 __all__ = ["FORMAT_VERSION", "Diagnosis"]

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -21,9 +21,11 @@ from scipy.interpolate import BSpline
 from scipy.ndimage import uniform_filter1d
 from scipy.signal import cont2discrete, lfilter, ss2tf
 
+from gfimu.array.kinematics import omega_products
 from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.model.located.rig_state import RigState
 from gfimu.model.located.usual import USUAL
+from gfimu.motion.body_drive import BodyDrive
 
 __all__ = [
     "Curve",
@@ -36,8 +38,10 @@ __all__ = [
     "Product",
     "Regressor",
     "Revolution",
+    "VectorForm",
     "Wave",
     "curve_over",
+    "vector_forms",
 ]
 
 _Floats = NDArray[np.float64]
@@ -237,6 +241,66 @@ class Form(Dependence):
         _, _, regressor, function, times = _FORMS[self.name]
         values = function(regressor.of(state) - self.first) / self.scale
         return np.asarray(values if times is None else values * times.of(state))[:, None]
+
+
+_Vectors = dict[str, tuple[str, str, Callable[[BodyDrive], _Floats]]]
+_VECTORS: _Vectors = {
+    "omega vector": ("omega", "in proportion to the rate about some axis", lambda body: body.rate),
+    "omega products": ("omega", "in proportion to products of the rates", lambda body: omega_products(body.rate)),
+    "omega cubes": ("omega", "in proportion to the cube of each rate", lambda body: body.rate**3),
+    "alpha vector": ("alpha", "in proportion to the angular acceleration", lambda body: body.acceleration),
+    "force vector": ("force", "in proportion to the specific force along some axis", lambda body: body.force),
+    "force change": (
+        "force",
+        "in proportion to how the specific force differs from that at first",
+        lambda body: body.force - body.force[0],
+    ),
+}
+"""Of what a free body does, by components: kind, words, and the components (n, K).
+
+The bias of a gyro is what it reads at first, at rest, and so holds what goes with the specific force there.
+"""
+
+
+@dataclass(frozen=True)
+class VectorForm(Dependence):
+    """A linear form of the components of a free body's motion, over ``scale``."""
+
+    name: str
+    scale: float
+
+    @property
+    def kind(self) -> str:  # type: ignore[override]
+        """The same for all that mean the same to a person."""
+        return _VECTORS[self.name][0]
+
+    @property
+    def words(self) -> str:  # type: ignore[override]
+        """How an error goes with it."""
+        return _VECTORS[self.name][1]
+
+    @property
+    def roots(self) -> tuple[_Floats, ...]:
+        """Roots of the prior covariance, one for each length scale."""
+        return (np.eye(6 if self.name == "omega products" else 3),)
+
+    @property
+    def numbers(self) -> dict[str, Any]:
+        """What makes it."""
+        return {"scale": self.scale}
+
+    def values(self, state: RigState) -> _Floats:
+        """Return the functions at the samples."""
+        return np.asarray(_VECTORS[self.name][2](state.free_body) / self.scale)
+
+
+def vector_forms(states: Sequence[RigState]) -> list[VectorForm]:
+    """Return the forms of free bodies, over the largest that each of these did."""
+    largest = {
+        name: max(float(np.abs(components(state.free_body)).max()) for state in states)
+        for name, (_, _, components) in _VECTORS.items()
+    }
+    return [VectorForm(name, scale) for name, scale in largest.items() if scale > 0.0]
 
 
 @dataclass(frozen=True)
@@ -460,6 +524,55 @@ class Wave(Dependence):
 
 
 @dataclass(frozen=True)
+class Step(Dependence):
+    """A change at a time since the start of a run, within a moment.
+
+    Parameters
+    ----------
+    at : float
+        Time, s.
+    apart : float
+        Time between two steps that are tried, s.
+    """
+
+    at: float
+    apart: float
+    kind: str = "step"
+    looks: float = USUAL.step_looks
+    of_one_recording: bool = True
+
+    @property
+    def numbers(self) -> dict[str, Any]:
+        """What makes it."""
+        return {"at": self.at}
+
+    @property
+    def name(self) -> str:  # type: ignore[override]
+        """Name in ``verdict.json``."""
+        return f"step at {self.at:.4g} s"
+
+    @property
+    def words(self) -> str:  # type: ignore[override]
+        """How an error goes with it."""
+        return f"all at once at {self.at:.4g} s"
+
+    @property
+    def roots(self) -> tuple[_Floats, ...]:
+        """Roots of the prior covariance, one for each length scale."""
+        return (np.eye(1),)
+
+    def near(self, width: float) -> list[Dependence]:
+        """Return dependences of another shape nearby."""
+        steps = np.linspace(-0.5, 0.5, 5) * width * self.apart  # numerical
+        return [replace(self, at=self.at + float(step)) for step in steps]
+
+    def values(self, state: RigState) -> _Floats:
+        """Return the functions at the samples."""
+        share = np.clip((state.t - self.at) / USUAL.step_s + 0.5, 0.0, 1.0)
+        return np.asarray((share**2 * (3.0 - 2.0 * share))[:, None])
+
+
+@dataclass(frozen=True)
 class Memory(Dependence):
     """A regressor at several times before: any linear filter of it that forgets within the longest lag."""
 
@@ -671,9 +784,11 @@ _MADE: tuple[tuple[str, Callable[[re.Match[str], Mapping[str, Any]], Dependence]
         lambda m, n: Revolution(_one_of(m[0], _ENVELOPES), _positive(n, "scale"), _count(n["harmonics"])),
     ),
     (r"order .*", lambda m, n: Wave(_positive(n, "cycles"), 1.0, fastest=_finite(n, "fastest"))),
+    (r"step at .*", lambda m, n: Step(_finite(n, "at"), 1.0)),
     (r"memory of (.*)", lambda m, n: Memory(_regressor(m[1]), _positive(n, "scale"))),
     (r"(\w+) lagging", lambda m, n: LowPassed(_regressor(m[1]), _finite(n, "first"), _positive(n, "scale"))),
     (r"mode at .* of (.*)", lambda m, n: _mode(_regressor(m[1]), n)),
+    (r"\w+ (?:vector|products|cubes|change)", lambda m, n: VectorForm(_one_of(m[0], _VECTORS), _positive(n, "scale"))),
     (r".*", lambda m, n: Form(_one_of(m[0], _FORMS), _positive(n, "scale"), _finite(n, "first"))),
 )
 """Patterns of names, and what makes the dependence from its name and its numbers."""

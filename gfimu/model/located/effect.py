@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gfimu.array.array import AccelerometerArray
 from gfimu.base.errors import InputError
 from gfimu.model.located.dependences import Dependence, dependence_of
-from gfimu.model.located.operators import Operator, Place, channel_place, rig_places
+from gfimu.model.located.operators import Operator, Place, body_places, channel_place, rig_places
 from gfimu.model.located.rig_state import AddedEffect, RigState
 
 __all__ = ["OF_REFERENCE", "UNLISTED", "LocatedEffect", "derivatives"]
@@ -113,7 +113,7 @@ class LocatedEffect(AddedEffect):
 
 def _place(what: str, name: str, series: Sequence[str], array: AccelerometerArray, *, is_angle: bool) -> Place:
     """Return a place by what the error there is; of channels with the series that it is of."""
-    places = rig_places(is_angle=is_angle)
+    places = rig_places(is_angle=is_angle) | body_places()
     if what in places:
         return places[what]
     members: dict[str, tuple[int, ...]] = {channel: (index,) for index, channel in enumerate(array.channels)}

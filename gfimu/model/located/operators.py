@@ -13,7 +13,7 @@ specific force of gravity and F that of the chip, all in that frame, and e′ a 
     the axis tilts by φ e′:        a·(φ̈ e′×r + 2ω φ̇ e′×(z×r) − φ e′×u)
     the table turns by φ more:     a·(φ̈ z×r + 2ω φ̇ z×(z×r)), and the reference reads it
 
-Each is A φ + B φ̇ + C φ̈ with A, B and C per observation.
+Each is A φ + B φ̇ + C φ̈ with A, B and C per observation. A free body has the places of `body_places` instead.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from gfimu.model.located.rig_state import RigState
 from gfimu.model.located.usual import USUAL
 
-__all__ = ["Operator", "Place", "channel_place", "rig_places"]
+__all__ = ["Operator", "Place", "body_places", "channel_place", "rig_places"]
 
 _Floats = NDArray[np.float64]
 _Groups = tuple[tuple[int, ...], ...]
@@ -123,6 +123,18 @@ def rig_places(*, is_angle: bool, has_geometry: bool = True) -> dict[str, Place]
         for place in places
         if has_geometry or place.what in _WITHOUT_GEOMETRY
     }
+
+
+def body_places() -> dict[str, Place]:
+    """Return the places of an array on a free body but its channels, by what the error there is."""
+    usual, x, xyz = USUAL, ("",), ("x", "y", "z")
+    places = (
+        Place("reference", "gyro", "the gyro reads otherwise than the body turns", "rad/s", usual.reads, xyz, _gyro),
+        Place("clock", "gyro late", "the gyro is late", "s", usual.late_s, x, _gyro_is_late),
+        Place("array", "arms", "the array stretches", "1", usual.ratio, x, _arms),
+        Place("supply", "gain", "the gain of all channels changes", "1", usual.ratio, x, _gain_of_all),
+    )
+    return {place.what: place for place in places}
 
 
 _WITHOUT_GEOMETRY = ("reads", "late", "gain")
@@ -253,6 +265,37 @@ def _tilts(state: RigState) -> list[Operator]:
 
 def _gain_of_all(state: RigState) -> list[Operator]:
     return [Operator(_observed(state.readings))]
+
+
+def _gyro(state: RigState) -> list[Operator]:
+    """Return what a body lacks that turns by φ e less than its gyro: e × r by φ̇, e × (ω × r) + ω × (e × r) by φ."""
+    axes, places, rate = state.on_body.axes, state.on_body.places, state.free_body.rate
+    operators = []
+    for unit in np.eye(3):
+        turned = (rate @ places.T) * (axes @ unit) + (rate @ axes.T) * (places @ unit)
+        turned -= 2.0 * np.outer(rate @ unit, _along(axes, places))
+        swung = np.tile(_along(axes, np.cross(unit, places)), (len(rate), 1))
+        operators.append(Operator(_observed(-turned), _observed(-swung)))
+    return operators
+
+
+def _rigid(state: RigState) -> _Floats:
+    """Return what the chips of a free body read by its turning, (n, c): a·(α × r + ω × (ω × r))."""
+    axes, places, body = state.on_body.axes, state.on_body.places, state.free_body
+    inward = (body.rate @ axes.T) * (body.rate @ places.T)
+    inward -= np.outer(state.spin.rate**2, _along(axes, places))
+    return np.asarray(body.acceleration @ np.cross(places, axes).T + inward)
+
+
+def _gyro_is_late(state: RigState) -> list[Operator]:
+    return [Operator(_observed(np.gradient(_rigid(state), state.period, axis=0)))]
+
+
+def _arms(state: RigState) -> list[Operator]:
+    axes, places = state.on_body.axes, state.on_body.places
+    by_rate = 2.0 * (state.free_body.rate @ np.cross(places, axes).T)
+    by_acceleration = np.tile(_along(axes, places), (len(by_rate), 1))
+    return [_operator(_rigid(state), by_rate, by_acceleration)]
 
 
 def _on_groups(values: _Floats, groups: _Groups) -> list[Operator]:

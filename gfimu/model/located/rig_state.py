@@ -11,9 +11,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.array.array import AccelerometerArray
+from gfimu.base.errors import InputError
 from gfimu.model.world_model import Effect, PlacedArray, SpinState
+from gfimu.motion.body_drive import BodyDrive
 
 __all__ = ["AddedEffect", "RigState", "split"]
+
+
+_NO_BODY = "an error of a free body, which a rig with an axis is not"
+_NO_TABLE = "an error of the table or of its angle, which the rig has not"
+
+
+@dataclass(frozen=True)
+class _Magnitudes:
+    """Magnitudes of the rate and of the angular acceleration of a body, which has no one angle."""
+
+    rate: NDArray[np.float64]
+    acceleration: NDArray[np.float64]
+
+    @property
+    def angle(self) -> NDArray[np.float64]:
+        """There is none."""
+        raise InputError(_NO_TABLE)
 
 
 @dataclass(frozen=True)
@@ -33,7 +52,9 @@ class RigState:
     period : float
         Sample period, s.
     placed : PlacedArray, optional
-        The array on the table; None where the simulation does not say how it stands.
+        The array on the table, or on its body; None where the simulation does not say how it stands.
+    body : BodyDrive, optional
+        Rate and specific force of a free body, whose spin then holds the magnitudes of rate and angular acceleration.
     """
 
     t: NDArray[np.float64]
@@ -42,11 +63,42 @@ class RigState:
     temperature: NDArray[np.float64] | None
     period: float
     placed: PlacedArray | None
+    body: BodyDrive | None = None
+
+    @classmethod
+    def of_body(
+        cls,
+        array: AccelerometerArray,
+        body: BodyDrive,
+        t: NDArray[np.float64],
+        readings: NDArray[np.float64],
+        temperature: NDArray[np.float64] | None,
+    ) -> RigState:
+        """Return the state of an array on a free body, at times since its run began."""
+        speed, quickness = (np.linalg.norm(one, axis=1) for one in body.rate_at())
+        spin = _Magnitudes(speed, quickness)
+        period = float(np.median(np.diff(t))) if len(t) > 1 else 1.0
+        return cls(t, spin, readings, temperature, period, PlacedArray(array.axes, array.positions, np.zeros(3)), body)
+
+    @property
+    def free_body(self) -> BodyDrive:
+        """The motion of a free body, where it is one."""
+        if self.body is None:
+            raise InputError(_NO_BODY)
+        return self.body
+
+    @property
+    def on_body(self) -> PlacedArray:
+        """The array on its free body."""
+        if self.body is None or self.placed is None:
+            raise InputError(_NO_BODY)
+        return self.placed
 
     @property
     def on_table(self) -> PlacedArray:
         """The array on the table, where the simulation says how it stands."""
-        assert self.placed is not None
+        if self.placed is None or self.body is not None:
+            raise InputError(_NO_TABLE)
         return self.placed
 
 

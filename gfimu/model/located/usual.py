@@ -37,8 +37,10 @@ class Usual:
         Logarithm of the frequency between two modes that are tried, about [1].
     forgotten : float
         Time constants after which a mode has forgotten [1].
-    mode_looks, wave_looks : float
-        What it costs to have chosen a mode, or a wave, among many [nats].
+    mode_looks, wave_looks, step_looks : float
+        What it costs to have chosen a mode, a wave, or the time of a step, among many [nats].
+    step_s : float
+        How long a step takes [s].
     turning : float
         Rate from which a table turns [rad/s].
     """
@@ -63,6 +65,8 @@ class Usual:
     forgotten: float = 3.0
     mode_looks: float = 4.0
     wave_looks: float = 6.0
+    step_looks: float = 4.0
+    step_s: float = 0.1
     turning: float = 0.05
 
 

@@ -109,10 +109,23 @@ def test_names_are_new():
     assert not set(FURTHER) & set(EFFECTS)
 
 
-def test_a_tumbling_body_has_no_spin_that_an_effect_could_go_with(tmp_path):
+@pytest.mark.parametrize(
+    ("place", "what", "dependence", "there"),
+    [
+        ("supply", "gain", "1", True),
+        ("array", "arms", "omega^2", True),
+        ("array", "stretches", "omega^2", False),
+        ("supply", "gain", "theta", False),
+    ],
+)
+def test_a_tumbling_body_has_no_table_whose_error_it_could_be(tmp_path, place, what, dependence, there):
     path = tmp_path / "tumble.toml"
     scenario = find_model("scenarios", "tumble").read_text(encoding="utf-8")
-    table = 'place = "supply", what = "gain", dependence = "1", numbers = { scale = 1.0, first = 0.0 }'
-    path.write_text(f'{scenario}\n[[effect]]\nname = "unlisted"\nparameters = {{ {table}, coefficients = [[0.1]] }}\n')
-    with pytest.raises(InputError, match=r"unlisted.*which a tumbling body has not"):
+    numbers = "numbers = { scale = 1.0, first = 0.0 }, coefficients = [[0.1]]"
+    table = f'place = "{place}", what = "{what}", dependence = "{dependence}", {numbers}'
+    path.write_text(f'{scenario}\n[[effect]]\nname = "unlisted"\nparameters = {{ {table} }}\n')
+    if there:
+        assert [effect.name for effect in Scenario.load(path).effects] == ["unlisted"]
+        return
+    with pytest.raises(InputError, match=r"unlisted: an error of the table or of its angle"):
         Scenario.load(path)

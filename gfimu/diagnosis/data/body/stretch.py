@@ -14,6 +14,7 @@ from gfimu.diagnosis.data.body.run import BodyRun
 from gfimu.diagnosis.data.cosine_basis import CosineBasis
 from gfimu.diagnosis.data.run import Run
 from gfimu.diagnosis.data.stretch import Stretch, finite_prediction
+from gfimu.model.located.rig_state import RigState, split
 from gfimu.model.world_model import BodyModel, Effect, WorldModel, is_of_wiring
 from gfimu.motion.body_drive import BodyDrive
 
@@ -148,10 +149,28 @@ class BodyStretch(Stretch):
 
     def channels(self, effects: Sequence[Effect], drive: BodyDrive) -> NDArray[np.float64]:
         """Predict the channels of every sample, shape (n, c), m/s²; raises as `predict`."""
-        run, every = self.run, [*self.known, *effects]
-        return finite_prediction(
-            lambda: self.model.predict_body(drive, run.t, effects=every, temperature=run.temperature, start=self.start)
-        )
+        return finite_prediction(lambda: self._at_times([*self.known, *effects], drive))
+
+    def _at_times(self, effects: Sequence[Effect], drive: BodyDrive) -> NDArray[np.float64]:
+        run, (own, added) = self.run, split(effects)
+        channels = self.model.predict_body(drive, run.t, effects=own, temperature=run.temperature, start=self.start)
+        if not added:
+            return channels
+        state = self._of_body(drive, channels)
+        return np.asarray(channels + np.sum([effect.added(state)[:, :-1] for effect in added], axis=0))
+
+    def _of_body(self, drive: BodyDrive, channels: NDArray[np.float64]) -> RigState:
+        run = self.run
+        return RigState.of_body(self.model.array, drive, run.t - self.start, channels, run.temperature)
+
+    def state(self, effects: Sequence[Effect], drive: object) -> RigState:
+        """Return what the body does at the samples, as the simulation has it with some effects of its own."""
+        assert isinstance(drive, BodyDrive)
+        return self._of_body(drive, self.channels(split(effects)[0], drive))
+
+    def observed(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return values at the samples (n, k) as the observations have them, (m, k)."""
+        return self.grouped(values)
 
     def predict(self, effects: Sequence[Effect], drive: object) -> NDArray[np.float64]:
         """Predict the observations, shape (m, c + 1), for a drive and effects besides the known ones."""

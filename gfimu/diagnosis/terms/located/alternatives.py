@@ -29,13 +29,24 @@ from gfimu.model.located.dependences import (
     Product,
     Regressor,
     Revolution,
+    Step,
     curve_over,
+    vector_forms,
 )
-from gfimu.model.located.operators import channel_place, rig_places
+from gfimu.model.located.operators import body_places, channel_place, rig_places
 from gfimu.model.located.rig_state import RigState
 from gfimu.model.located.usual import USUAL
 
-__all__ = ["ChannelTerms", "channel_patterns", "channel_terms", "chip_groups", "dependences", "rig_terms"]
+__all__ = [
+    "ChannelTerms",
+    "body_dependences",
+    "body_terms",
+    "channel_patterns",
+    "channel_terms",
+    "chip_groups",
+    "dependences",
+    "rig_terms",
+]
 
 _Floats = NDArray[np.float64]
 ChannelPattern = tuple[str, str, tuple[tuple[int, ...], ...], tuple[str, ...]]
@@ -70,7 +81,28 @@ def dependences(states: Sequence[RigState]) -> dict[str, Dependence]:
         *(Revolution(f"revolution{growth}", rate) for growth in ("", " |omega|", " omega^2", " omega")),
         Memory(ACCELERATION, acceleration),
     ]
-    return {one.name: one for one in (*forms, *curves, *_of_temperature(states))}
+    return {one.name: one for one in (*forms, *curves, *_of_temperature(states), *_steps(states))}
+
+
+def body_dependences(states: Sequence[RigState]) -> dict[str, Dependence]:
+    """Return all dependences of an array on a free body, by name, on the scales of what bodies did."""
+    seen = {one.name: np.concatenate([one.of(state) for state in states]) for one in (RATE, TIME)}
+    rate, slow = _largest(states, RATE), max(_largest(states, RATE) / 6.0, 0.05)  # numerical
+    scales = {"1": 1.0, "omega": rate, "omega^2": rate**2, "omega^4": rate**4, "t": float(seen["t"].max())}
+    curves = [
+        curve_over(RATE, seen["omega"], LOCATED.rate_functions, USUAL.lengths, warp=slow),
+        curve_over(TIME, seen["t"], LOCATED.time_functions, LOCATED.time_lengths),
+    ]
+    forms = [Form(name, scale) for name, scale in scales.items()]
+    others = (*vector_forms(states), *_of_temperature(states), *_steps(states))
+    return {one.name: one for one in (*forms, *curves, *others)}
+
+
+def _steps(states: Sequence[RigState]) -> list[Step]:
+    """Return steps all over the time of the runs, but not at their ends."""
+    first, last = min(float(state.t[0]) for state in states), max(float(state.t[-1]) for state in states)
+    times = np.linspace(first, last, LOCATED.steps + 2)[1:-1]
+    return [Step(float(at), float(times[1] - times[0])) for at in times]
 
 
 def _of_temperature(states: Sequence[RigState]) -> list[Dependence]:
@@ -111,6 +143,25 @@ _OF_PLACE = {
 }
 
 
+_STEPPED = ("reads", "leans", "moves", "gain")
+"""Places of the rig where something may slip or jump."""
+
+_OF_BODY = {
+    "gyro": ("omega vector", "omega products", "omega cubes", "force change", "t", "f(t)", "T", "f(T)"),
+    "gyro late": ("1", "t", "f(t)", "f(T)"),
+    "arms": ("1", "omega^2", "f(omega)", "f(t)", "f(T)"),
+    "gain": ("1", "omega", "omega^2", "f(omega)", "t", "f(t)", "f(T)"),
+}
+
+
+def body_terms(every: dict[str, Dependence]) -> list[LocatedTerm]:
+    """Return the terms of an array on a free body but those of its channels."""
+    places = body_places()
+    return [
+        LocatedTerm(places[what], every[name]) for what, names in _OF_BODY.items() for name in names if name in every
+    ]
+
+
 def rig_terms(states: Sequence[RigState], every: dict[str, Dependence], *, is_angle: bool) -> list[LocatedTerm]:
     """Return the terms of places in the rig, but those of waves that are looked for."""
     places = rig_places(is_angle=is_angle, has_geometry=states[0].placed is not None)
@@ -120,6 +171,8 @@ def rig_terms(states: Sequence[RigState], every: dict[str, Dependence], *, is_an
         for name in _OF_PLACE.get(what, ())
         if name in every
     ]
+    steps = [one for one in every.values() if isinstance(one, Step)]
+    terms += [LocatedTerm(places[what], one) for what in _STEPPED if what in places for one in steps]
     displacement, acceleration = (0,), (2,)
     followed = dict.fromkeys(("twists", "leans", "moves", "tilts"), displacement)
     for what, outputs in (followed | {"shakes": acceleration, "heaves": acceleration}).items():
@@ -170,13 +223,15 @@ def channel_terms(
     each = channel_patterns(array)
     most = max(float(np.abs(state.readings).max()) for state in states)
     readings = [OfReading(most, power) for power in (0, 2, 3)]
-    offsets = [one for name, one in every.items() if name not in ("memory of alpha", "revolution omega")]
-    modes = _modes(states, (ACCELERATION, RATE_SQUARED), (2,))
+    others = ("memory of alpha", "revolution omega", "force change")
+    offsets = [one for name, one in every.items() if name not in others]
+    modes = _modes(states, (ACCELERATION, RATE_SQUARED), (2,)) if states[0].body is None else []
     gains = ("1", "f(omega)", "f(t)", "omega", "omega^2", "|omega|", "t", "f(T)")
     late = ("1", "t", "f(t)")
+    steps = tuple(name for name, one in every.items() if isinstance(one, Step))
     return [
         *(ChannelTerms("offset", one, (*each, *of_chip)) for one in (*offsets, *readings)),
-        *(ChannelTerms("gain", every[name], (*each, *alike)) for name in gains if name in every),
+        *(ChannelTerms("gain", every[name], (*each, *alike)) for name in (*gains, *steps) if name in every),
         *(ChannelTerms("delay", every[name], tuple(clocks)) for name in late),
         *(ChannelTerms("offset", mode, of_chip) for mode in modes),
     ]

@@ -59,6 +59,8 @@ class LocatedPolicy:
         The same of a function of two regressors [1].
     mode_hz : tuple of (float, float)
         Lowest and highest frequency of a mode [Hz].
+    steps : int
+        Steps that are tried all over the time of a run, of whose leader the time is refined [count].
     modes : int
         Frequencies between them [count].
     fastest : float
@@ -100,6 +102,7 @@ class LocatedPolicy:
     temperature_lengths: tuple[float, ...] = (0.3, 1.0)
     product_length: float = 0.5
     mode_hz: tuple[float, float] = (2.5, 40.0)
+    steps: int = 9
     modes: int = 15
     fastest: float = 0.4
     warmed: float = 0.2

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -113,8 +113,13 @@ def is_located(cause: Cause) -> bool:
     return isinstance(cause.family, LocatedTerm)
 
 
-def located_columns(term: LocatedTerm, state: RigState, weight: _Floats) -> Columns:
-    """Return what each coefficient of a term, in its usual size, adds to observations weighed by (n, c + 1)."""
+def located_columns(
+    term: LocatedTerm, state: RigState, weight: _Floats, observed: Callable[[_Floats], _Floats] = np.asarray
+) -> Columns:
+    """Return what each coefficient of a term, in its usual size, adds to observations weighed by (m, c + 1).
+
+    ``observed`` makes observations of values at the samples, where these differ (`BodyStretch.observed`).
+    """
     basis, operators = term.dependence.values(state), term.where.operators(state)
     count, observations = term.dependence.count, weight.shape[1]
     places: list[list[NDArray[np.intp]]] = [[] for _ in range(observations)]
@@ -127,8 +132,8 @@ def located_columns(term: LocatedTerm, state: RigState, weight: _Floats) -> Colu
             for part, values in zip(operator.parts, own, strict=False):
                 column += 0.0 if part is None else part[:, [c]] * values
             places[c].append(np.arange(index * count, (index + 1) * count))
-            parts[c].append(column * (term.where.usual * weight[:, [c]]))
-    empty = np.zeros((len(state.t), 0))
+            parts[c].append(observed(column) * (term.where.usual * weight[:, [c]]))
+    empty = np.zeros((len(weight), 0))
     return Columns(
         term.count,
         tuple(np.concatenate(mine) if mine else np.zeros(0, dtype=np.intp) for mine in places),

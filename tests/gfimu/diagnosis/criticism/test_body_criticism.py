@@ -1,4 +1,4 @@
-"""What a free body leaves: noise that grows with the motion, functions of the motion, a tone."""
+"""What a free body leaves: noise that grows with the motion, a tone."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 from made_bodies import PERIOD, TWIN, hand_motion, hand_stretch
 
 from gfimu.diagnosis import Policy
-from gfimu.diagnosis.criticism.body import body_functions, motion_noise, tone
+from gfimu.diagnosis.criticism.body import motion_noise, tone
 from gfimu.diagnosis.terms.hand.drive import HandDrive
 from gfimu.diagnosis.terms.hand.learning import first_noise
 from gfimu.diagnosis.terms.hand.posterior import condition_hand
@@ -56,28 +56,6 @@ def test_lost_angular_acceleration_is_told_as_its_size_in_motion(stretch):
     size = 0.2 * np.sqrt(np.mean(stretch.change[stretch.use] ** 2))  # the body never rests
     assert f"by {size:.2g} rad/s² rms in motion" in found.signature
     assert "disagree" not in found.signature
-
-
-def test_functions_of_the_motion_are_those_of_the_groups(stretch):
-    found = body_functions(stretch, HandDrive.of(stretch))
-    rate, acceleration = (stretch.grouped(one) for one in HandDrive.of(stretch).spin.rate_at())
-    assert all(len(one) == len(stretch.starts) for one in found.values())
-    on = stretch.on
-    for place, axis in enumerate("xyz"):
-        assert found[f"ω{axis}"] == pytest.approx(rate[:, place])
-        assert found[f"dω{axis}/dt"] == pytest.approx(acceleration[:, place])
-    # No group is at rest, so that each has one sample and products of means are means of products.
-    assert found["ωxωz"][on] == pytest.approx((rate[:, 0] * rate[:, 2])[on])
-    assert found["ωy²"][on] == pytest.approx(rate[on, 1] ** 2)
-    assert found["|ω|⁴"][on] == pytest.approx(np.sum(rate[on] ** 2, axis=1) ** 2)
-    force = HandDrive.of(stretch).spin.force
-    assert found["the specific force squared"][on] == pytest.approx(
-        stretch.grouped(np.sum(force**2, axis=1)[:, None])[on, 0]
-    )
-    step = found["time (a step at 25% of the run)"]
-    middle = stretch.grouped(stretch.run.t[:, None])[:, 0]
-    assert np.all(step[on & (middle < 2.9)] == -1.0)
-    assert np.all(step[on & (middle > 3.1)] == 1.0)
 
 
 def test_a_tone_is_told_by_channel_frequency_and_size():

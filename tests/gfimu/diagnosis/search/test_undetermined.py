@@ -9,7 +9,7 @@ import pytest
 from made_bodies import TWIN
 
 from gfimu.diagnosis.search.screening import Screening, Signature
-from gfimu.diagnosis.verdict.undetermined import Undetermined, undetermined, undetermined_sentence
+from gfimu.diagnosis.search.undetermined import Undetermined, undetermined, undetermined_sentence
 from sim.effects import BODY_EFFECTS, Size
 
 ARRAY = TWIN.array
