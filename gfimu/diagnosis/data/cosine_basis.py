@@ -63,10 +63,6 @@ class CosineBasis:
         self.frequency = np.arange(count) / (2 * self._duration)
         self.flicker_spectrum, self.walk_spectrum = self._spectra(count)
 
-    def spectrum_of_flicker(self, count: int) -> NDArray[np.float64]:
-        """Return the spectrum of bias instability of unit rms on the first cosines, shape (count,)."""
-        return self._spectra(count)[0]
-
     def _spectra(self, count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the spectra of bias instability and of a random walk, of unit size, on the first cosines."""
         duration, period = self._duration, self.period

@@ -1,27 +1,20 @@
-"""Tables of the report with a row per channel: rms with bars, and the fingerprint with a colour per cell.
+"""The table of the report with a row per channel: rms with bars.
 
-They are HTML instead of pictures: each value is written where it is shown, lines wrap or scroll on a narrow screen, and
-a screen reader reads them.
+It is HTML instead of a picture: each value is written where it is shown, lines wrap or scroll on a narrow screen, and a
+screen reader reads them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.colors import SymLogNorm, to_hex
-from numpy.typing import NDArray
 
 from gfimu.array.array import AccelerometerArray
-from gfimu.base.results.colours import DIVERGING
-from gfimu.diagnosis.criticism.views.dependence import Fingerprint
 from gfimu.diagnosis.criticism.views.residuals import ResidualSize
-from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.report.plain_words import three_digits
 
-__all__ = ["ChannelBars", "FingerprintCell", "FingerprintRow", "RmsRow", "channel_bars", "fingerprint_rows"]
+__all__ = ["ChannelBars", "RmsRow", "channel_bars"]
 
 _DECADE_FROM = 20.0  # ratio of the largest rms to the least noise from which bars are logarithmic
 
@@ -60,24 +53,6 @@ class ChannelBars:
     scale: str
 
 
-@dataclass(frozen=True)
-class FingerprintCell:
-    """One cell: its number in standard deviations, and colours of ground and number; all empty within chance."""
-
-    text: str
-    ground: str
-    ink: str
-
-
-@dataclass(frozen=True)
-class FingerprintRow:
-    """Cells of one channel, one per term."""
-
-    channel: str
-    before: tuple[FingerprintCell, ...]
-    after: tuple[FingerprintCell, ...]
-
-
 def channel_bars(size: ResidualSize, array: AccelerometerArray) -> ChannelBars:
     """Return the rms of the residual of every channel, before and after, beside its noise.
 
@@ -109,27 +84,3 @@ def channel_bars(size: ResidualSize, array: AccelerometerArray) -> ChannelBars:
     )
     kind = f"logarithmic, from {three_digits(low)} to" if logarithmic else "linear, from 0 to"
     return ChannelBars(rows, f"{kind} {three_digits(high)} m/s²")
-
-
-def fingerprint_rows(fingerprint: Fingerprint) -> tuple[FingerprintRow, ...]:
-    """Return how strongly each channel follows each basic term, before and after, in standard deviations of chance."""
-    largest = max(10.0, *(float(np.abs(one).max(initial=0.0)) for one in (fingerprint.before, fingerprint.after)))
-    norm = SymLogNorm(linthresh=Policy.noise_stds, vmin=-largest, vmax=largest)
-
-    def cells(values: Sequence[NDArray[np.float64]]) -> tuple[FingerprintCell, ...]:
-        return tuple(_cell(float(value), norm) for value in values)
-
-    return tuple(
-        FingerprintRow(name, cells(before), cells(after))
-        for name, before, after in zip(fingerprint.channels, fingerprint.before, fingerprint.after, strict=True)
-    )
-
-
-def _cell(value: float, norm: SymLogNorm) -> FingerprintCell:
-    if not abs(value) >= Policy.noise_stds:
-        return FingerprintCell("", "", "")
-    colour = np.array(mpl.colormaps[DIVERGING](norm(value)))[:3]
-    linear = np.where(colour <= 0.04045, colour / 12.92, ((colour + 0.055) / 1.055) ** 2.4)  # sRGB
-    light = float(linear @ [0.2126, 0.7152, 0.0722])
-    ink = "#000000" if (light + 0.05) / 0.05 > 1.05 / (light + 0.05) else "#ffffff"  # the larger contrast, WCAG 2.2
-    return FingerprintCell(f"{value:.0f}".replace("-", "−"), to_hex(tuple(colour)), ink)

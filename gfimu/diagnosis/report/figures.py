@@ -19,20 +19,21 @@ from gfimu.base.results.colours import (
     PALE,
     css,
 )
-from gfimu.diagnosis.criticism.views.dependence import Dependence
+from gfimu.diagnosis.criticism.views.error_form import ErrorForm
 from gfimu.diagnosis.criticism.views.residual_spectrum import ResidualSpectrum
 from gfimu.diagnosis.criticism.views.residuals import ResidualSize, Whiteness
 from gfimu.diagnosis.criticism.views.run_view import RunView
 from gfimu.diagnosis.verdict.parts import FunctionTable
 from gfimu.visual.page import PlotLimits
 from gfimu.visual.page.svg import ON_PAGE, svg_text
-from gfimu.visual.rig.figure import array_figure, channel_style
+from gfimu.visual.rig.figure import Marked, array_figure, channel_style
 from gfimu.visual.rig.words import short_name
 
 __all__ = [
     "channels_figure",
-    "dependence_figure",
+    "form_figure",
     "function_figure",
+    "marked_figure",
     "rig_figures",
     "spectrum_figure",
     "trace_figure",
@@ -99,6 +100,21 @@ def channels_figure(run: RunView, size: ResidualSize, array: AccelerometerArray)
         return svg_text(figure, _COARSE_DPI if count > _MANY else None)
 
 
+def marked_figure(
+    array: AccelerometerArray,
+    axis: TurningAxis | None,
+    gravity: NDArray[np.float64] | None,
+    gravity_name: str,
+    marked: Marked,
+) -> str:
+    """Draw the array from the side, with the places of what was found."""
+    with mpl.rc_context(ON_PAGE):
+        drawn = array_figure(
+            array, axis=axis, gravity=gravity, gravity_name=gravity_name, views=("side",), marked=marked
+        )
+        return svg_text(drawn)
+
+
 def rig_figures(
     array: AccelerometerArray, axis: TurningAxis | None, gravity: NDArray[np.float64] | None, gravity_name: str
 ) -> tuple[str, str]:
@@ -111,37 +127,20 @@ def rig_figures(
     return side, above
 
 
-def dependence_figure(dependence: Dependence, array: AccelerometerArray) -> str:
-    """Draw the mean residual over one quantity, before and after, the four strongest channels in colour."""
+def form_figure(form: ErrorForm) -> str:
+    """Draw the residual of a channel over a quantity, and what the extended simulation makes of it."""
     with mpl.rc_context(ON_PAGE):
         figure = Figure(figsize=_VIEW, layout="constrained")
-        pair = figure.subplots(1, 2, sharey=True)
-        strongest = list(np.argsort(-dependence.amplitude_before)[: _LIMITS.coloured])
-        many = array.n_channels > _MANY
-        for axis, mean, title in zip(pair, (dependence.before, dependence.after), ("before", "after"), strict=True):
-            axis.axhline(0.0, color=_NOISE, linewidth=0.6)
-            for channel in range(array.n_channels):
-                if channel not in strongest:
-                    axis.plot(
-                        dependence.centres[:, channel], mean[:, channel], color=_PALE, linewidth=0.8, rasterized=many
-                    )
-            for channel in strongest:
-                colour, line = channel_style(array, channel)
-                axis.plot(
-                    dependence.centres[:, channel],
-                    mean[:, channel],
-                    color=colour,
-                    linestyle=line,
-                    linewidth=1.3,
-                    label=short_name(array.channels[channel]),
-                )
-            axis.set_title(title, loc="left", fontsize=9.5, pad=3)
-            axis.set_xlabel(f"{dependence.symbol}, {dependence.unit}")
-        pair[0].set_ylabel("mean residual, m/s²")
-        figure.legend(
-            *pair[1].get_legend_handles_labels(), loc="outside lower center", ncols=len(strongest), fontsize=8,
-            handlelength=1.6, columnspacing=1.0,
+        axis = figure.subplots()
+        axis.axhline(0.0, color=_NOISE, linewidth=0.6)
+        axis.errorbar(
+            form.at, form.mean, 2.0 * form.std, color=_BEFORE, fmt="o", markersize=3.5, linewidth=0.9,
+            label="measured − given simulation, ±2σ",
         )  # fmt: skip
+        axis.plot(form.at, form.form, color=_AFTER, linewidth=1.3, label="extended simulation")
+        axis.set_xlabel(f"{form.symbol}, {form.unit}")
+        axis.set_ylabel(f"{short_name(form.channel)}, m/s²")
+        axis.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, fontsize=8, handlelength=1.2, borderpad=0)
         return svg_text(figure)
 
 

@@ -14,7 +14,7 @@ from gfimu.base.version import __version__
 from gfimu.diagnosis.criticism.views.residuals import ResidualViews, residual_views
 from gfimu.diagnosis.criticism.views.run_view import RunView
 from gfimu.diagnosis.report import figures
-from gfimu.diagnosis.report.channel_tables import channel_bars, fingerprint_rows
+from gfimu.diagnosis.report.channel_tables import channel_bars
 from gfimu.diagnosis.report.plain_words import (
     gain_rows,
     headline,
@@ -29,8 +29,8 @@ from gfimu.diagnosis.report.plain_words import (
     three_digits,
     unexplained,
 )
-from gfimu.diagnosis.report.rig import DrawnRig
-from gfimu.diagnosis.report.zooming import dependence_plot, residual_plot, spectrum_plot
+from gfimu.diagnosis.report.rig import DrawnRig, marked_of, marked_words
+from gfimu.diagnosis.report.zooming import residual_plot, spectrum_plot
 from gfimu.diagnosis.verdict.parts import NamedCause
 from gfimu.diagnosis.verdict.verdict import Diagnosis
 from gfimu.diagnosis.verdict.wording import SAME_SHARE
@@ -48,21 +48,9 @@ _VERDICTS = {
     "ambiguous": ("Ambiguous", "open"),
     "unknown": ("Unknown cause", "alarm"),
 }
-_VIEWS = (
-    ("time", "over time"),
-    ("rate", "over the rate"),
-    ("rate squared", "over the rate squared"),
-    ("acceleration", "over the angular acceleration"),
-    ("angle", "over the table's angle"),
-    ("temperature", "over the board's temperature"),
-    ("reading", "over the reading itself"),
-)
-_NO_SHARE = "No sizeable share of the residual follows it beyond chance"
-_NO_LINE = "No line stands out beyond chance"
-_NOISE = "It is: neighbouring samples agree no more than by chance"
-"""What is written of a view that shows nothing."""
 _MOST_PARAMETERS = 14
 _FIRST_PARAMETERS = 4  # beside the headline
+_MOST_FUNCTIONS = 2  # on the first screen
 
 
 def write_report(path: str | Path, diagnosis: Diagnosis, rig: DrawnRig | None = None) -> None:
@@ -105,12 +93,13 @@ def _content(diagnosis: Diagnosis, rig: DrawnRig) -> Mapping[str, Any]:
         "plots": zooming,
         "plot_rule": _plot_rule(plots["residual"]["grouped"]) if seen else "",
         "array": _array(diagnosis, rig),
+        "drawn": _drawn(diagnosis, rig, found[0] if found else None),
         "headline": headline(diagnosis),
         "story": story(diagnosis),
         "sentences": diagnosis.sentences[1:],
         "figures_of_merit": _figures_of_merit(diagnosis),
         "causes": [_cause(diagnosis, cause) for cause in diagnosis.causes if cause.unlisted is None],
-        "located": [_located(cause, array) for cause in diagnosis.causes if cause.unlisted is not None],
+        "located": [_located(cause) for cause in diagnosis.causes if cause.unlisted is not None],
         "unexplained": unexplained(diagnosis),
         "rivals": diagnosis.rivals,
         "gain": diagnosis.gain,
@@ -122,10 +111,9 @@ def _content(diagnosis: Diagnosis, rig: DrawnRig) -> Mapping[str, Any]:
         "noise_texts": noise_texts(diagnosis.noise, linear=any(run.linear for run in seen)),
         "linear": any(run.linear for run in seen),
         "runs": [_run(run, views, array) for run, views in zip(seen, found, strict=True)],
-        "views": shown,
+        "views": [view for view in shown if view["sentence"]],
+        "silent": [view for view in shown if not view["sentence"]],
         "channels_picture": _picture(figures.channels_figure(seen[0], found[0].size, array), array) if found else "",
-        "terms": found[0].fingerprint.terms if found else (),
-        "fingerprint": fingerprint_rows(found[0].fingerprint) if found else (),
     }
 
 
@@ -181,15 +169,38 @@ def _array(diagnosis: Diagnosis, rig: DrawnRig) -> dict[str, Any]:
     }
 
 
-def _located(cause: NamedCause, array: AccelerometerArray) -> Mapping[str, Any]:
-    """Return the words and the picture of something that has a place and no name."""
+def _drawn(diagnosis: Diagnosis, rig: DrawnRig, views: ResidualViews | None) -> list[tuple[str, str]]:
+    """Return the pictures of the first screen with their captions: where it is, and what it goes with."""
+    array = diagnosis.twin.array
+    if not diagnosis.causes:
+        return []
+    axis, gravity, name = rig.seen_from(array, diagnosis.runs[0] if diagnosis.runs else None)
+    marked = marked_of(diagnosis)
+    where = figures.marked_figure(array, axis, gravity, name, marked)
+    drawn = [(where, f"Where it is: {marked_words(marked, array, has_axis=axis is not None)}.")]
+    tables = [cause.unlisted for cause in diagnosis.causes if cause.unlisted is not None and cause.unlisted.function]
+    for one in tables[:_MOST_FUNCTIONS]:
+        assert one.function is not None
+        caption = f"{one.text[0].upper()}{one.text[1:]}: the function that the data show, ±2σ."
+        drawn.append((figures.function_figure(one.function, one.what), caption))
+    if views is not None and views.form is not None:
+        form = views.form
+        caption = (
+            f"What was wrong in {form.channel}: {percent(form.share)} of the square of its error goes with "
+            f"{form.quantity}. The line is what the extended simulation makes of it."
+        )
+        drawn.append((figures.form_figure(form), caption))
+    return [(_picture(svg, array), caption) for svg, caption in drawn]
+
+
+def _located(cause: NamedCause) -> Mapping[str, Any]:
+    """Return the words of something that has a place and no name."""
     one = cause.unlisted
     assert one is not None
     return {
         "text": one.text[0].upper() + one.text[1:],
         "probability": percent(one.place_probability),
         "instead": one.instead,
-        "picture": "" if one.function is None else _picture(figures.function_figure(one.function, one.what), array),
     }
 
 
@@ -236,23 +247,18 @@ def _views(diagnosis: Diagnosis, views: ResidualViews, plots: dict[str, Any], da
     array = diagnosis.twin.array
     shown: list[Mapping[str, Any]] = []
 
-    def show(title: str, view: Any, picture: str, caption: str, calm: str, plot: dict[str, Any] | None = None) -> None:
-        name = "" if plot is None else title.replace(" ", "-").replace("'", "")
-        if plot is not None:
+    def show(title: str, view: Any, picture: str, caption: str, plot: dict[str, Any] | None = None) -> None:
+        name = "" if plot is None or not view.sentence else title.replace(" ", "-")
+        if name and plot is not None:
             plots[name] = plot
-        words = {"title": title, "sentence": view.sentence, "looks": view.looks, "caption": caption, "calm": calm}
+        words = {"title": title, "sentence": view.sentence, "looks": view.looks, "caption": caption}
         shown.append({**words, "picture": _picture(picture, array), "plot": name})
 
-    for name, title in _VIEWS:
-        if (dependence := views.by_view(name)) is not None:
-            strongest = array.channels[int(np.argmax(np.nan_to_num(dependence.amplitude_before)))]
-            caption = f"Mean residual over {dependence.quantity}; {strongest} follows it most."
-            plot = dependence_plot(dependence, array, data)
-            show(title, dependence, figures.dependence_figure(dependence, array), caption, _NO_SHARE, plot)
-    for spectrum, title in ((views.spectrum, "over frequency"), (views.orders, "over cycles per revolution")):
+    spectra = ((views.spectrum, "a line over frequency"), (views.orders, "a line over cycles per revolution"))
+    for spectrum, title in spectra:
         if spectrum is not None:
             caption = "Rms over the channels beside that of noise; drawn at its peaks."
-            show(title, spectrum, figures.spectrum_figure(spectrum), caption, _NO_LINE, spectrum_plot(spectrum, data))
+            show(title, spectrum, figures.spectrum_figure(spectrum), caption, spectrum_plot(spectrum, data))
     caption = "Cumulative periodogram of each channel; that of noise stays in the band."
-    show("is it noise?", views.whiteness, figures.whiteness_figure(views.whiteness), caption, _NOISE)
+    show("is it noise?", views.whiteness, figures.whiteness_figure(views.whiteness), caption)
     return shown

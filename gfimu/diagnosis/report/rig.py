@@ -13,11 +13,15 @@ from scipy.spatial.transform import Rotation
 from gfimu.array.array import AccelerometerArray
 from gfimu.array.turning_axis import TurningAxis
 from gfimu.diagnosis.criticism.views.run_view import RunView
+from gfimu.diagnosis.policy import Policy
+from gfimu.diagnosis.verdict.parts import NamedCause
+from gfimu.diagnosis.verdict.verdict import Diagnosis
+from gfimu.visual.rig.figure import Marked
 
 if TYPE_CHECKING:
     from gfimu.visual.scene import Shape
 
-__all__ = ["DrawnRig"]
+__all__ = ["DrawnRig", "marked_of", "marked_words"]
 
 
 @dataclass(frozen=True)
@@ -87,6 +91,43 @@ class DrawnRig:
             return np.asarray(about.apply(centre))
         lift = -float(np.linalg.norm(centre)) * _down()
         return np.asarray(Rotation.from_rotvec(self.lean).apply(about.apply(centre)) + lift)
+
+
+def marked_of(diagnosis: Diagnosis) -> Marked:
+    """Return where the causes of a diagnosis are: their chips, or the package, or the axis with what turns about it."""
+    array, families = diagnosis.twin.array, diagnosis.twin.families()
+    chips, kinds = set[int](), set[str]()
+    for cause in diagnosis.causes:
+        own = _chips(cause, array)
+        chips |= own
+        if cause.unlisted is not None:
+            kinds |= set() if own else {cause.unlisted.place}
+        elif not own and cause.effect in families:
+            kinds |= {families[cause.effect].place}
+    if kinds & {"sensing", "supply"}:
+        chips |= set(range(len(array.chips)))
+    return Marked(frozenset(chips), bool(kinds & {"geometry", "array"}), bool(kinds - {"sensing", "supply", "array"}))
+
+
+def _chips(cause: NamedCause, array: AccelerometerArray) -> set[int]:
+    """Return the chips that a cause names: by its series, or by the keys of its sizes that stand out."""
+    seen = [key for key, std in cause.std.items() if abs(float(cause.parameters[key])) > Policy.stds * std]
+    words = [*(cause.unlisted.series if cause.unlisted is not None else seen), *cause.place.split()]
+    names = {word.partition("_")[0] for word in words}
+    of_channels = zip(array.channels, array.chip_of_channel, strict=True)
+    found = {int(chip) for channel, chip in of_channels if channel in names}
+    return found | {number for number, chip in enumerate(array.chips) if chip.name in names}
+
+
+def marked_words(marked: Marked, array: AccelerometerArray, *, has_axis: bool) -> str:
+    """Return what a drawing marks."""
+    parts = ["the array as a whole"] if marked.package else []
+    if marked.chips:
+        names = [array.chips[number].name for number in sorted(marked.chips)]
+        parts.append("every chip" if len(names) == len(array.chips) else f"chip {', '.join(names)}")
+    if marked.axis:
+        parts.append("the axis, with the table and its reference" if has_axis else "the gyro, which is not drawn")
+    return "; ".join(parts) or "nowhere in the array"
 
 
 def _down() -> NDArray[np.float64]:

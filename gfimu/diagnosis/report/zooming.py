@@ -1,4 +1,4 @@
-"""What the report's plots that zoom hold: residuals over time, means over the motion, spectra."""
+"""What the report's plots that zoom hold: residuals over time, and spectra."""
 
 from __future__ import annotations
 
@@ -9,14 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.array.array import AccelerometerArray
-from gfimu.diagnosis.criticism.views.dependence import Dependence
 from gfimu.diagnosis.criticism.views.residual_spectrum import ResidualSpectrum
 from gfimu.diagnosis.criticism.views.residuals import ResidualSize
 from gfimu.diagnosis.criticism.views.run_view import RunView
 from gfimu.visual.page import Packed, PlotLimits, enveloped
 from gfimu.visual.plots import broken_at_gaps
 
-__all__ = ["dependence_plot", "residual_plot", "spectrum_plot"]
+__all__ = ["residual_plot", "spectrum_plot"]
 
 _LIMITS = PlotLimits()
 
@@ -73,35 +72,6 @@ def residual_plot(run: RunView, size: ResidualSize, array: AccelerometerArray, d
             "unit": "m/s" if run.linear else "rad/s",
             "column": data.add(drive[:, 0], max(_largest(run.rate) / 2**12, 1e-9), order=1),
         },
-    }
-
-
-def dependence_plot(dependence: Dependence, array: AccelerometerArray, data: Packed) -> dict[str, Any]:
-    """Return the plot of the mean residual of every channel over one quantity, before and after."""
-    strength = np.nan_to_num(dependence.amplitude_before)
-    step = max(_largest(dependence.before), _largest(dependence.after)) / 2**12
-    return {
-        "kind": "dependence",
-        "x": {
-            "name": dependence.symbol,
-            "label": f"{dependence.symbol}, {dependence.unit}",
-            "unit": dependence.unit,
-            "column": data.add(dependence.centres.T.ravel(), _largest(dependence.centres) / 2**14, order=1),
-        },
-        "unit": "m/s²",
-        "label": "mean residual, m/s²",
-        "strongest": [int(one) for one in np.argsort(-strength, kind="stable")[: _LIMITS.coloured]],
-        "bins": len(dependence.centres),  # of each channel, one channel after the other
-        "before": data.add(dependence.before.T.ravel(), step),
-        "after": data.add(dependence.after.T.ravel(), step),
-        "channels": [
-            {
-                "name": name,
-                "chip": int(chip),
-                "dash": int(np.count_nonzero(array.chip_of_channel[:column] == chip)),
-            }
-            for column, (name, chip) in enumerate(zip(array.channels, array.chip_of_channel, strict=True))
-        ],
     }
 
 

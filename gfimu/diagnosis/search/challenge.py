@@ -105,7 +105,7 @@ def challenge(stretches: Sequence[Stretch], point: Point, policy: Policy) -> Cha
     Parameters
     ----------
     stretches : sequence of Stretch
-        The data of a table.
+        The data.
     point : Point
         The set at its optimum, with the noise that it leaves.
     policy : Policy
@@ -114,8 +114,9 @@ def challenge(stretches: Sequence[Stretch], point: Point, policy: Policy) -> Cha
     best, nothing = (fit(stretches, replace(point, causes=some), policy) for some in (point.causes, ()))
     leading = max(best, _settled(stretches, best, policy), key=lambda one: one.log_posterior)
     settled = {best.key: leading}
+    is_body = isinstance(stretches[0], BodyStretch)
     for _ in range(LOCATED.terms):
-        if isinstance(stretches[0], BodyStretch):  # whose evidences are of one noise, as long as nothing joins
+        if is_body:  # the evidence is that of one misfit of the noise, and compares with no other
             settled = {leading.key: leading}
         fewer = _fewer(stretches, leading, policy)
         needed = _needed(leading, fewer, nothing, policy)
@@ -123,7 +124,8 @@ def challenge(stretches: Sequence[Stretch], point: Point, policy: Policy) -> Cha
         for one in tried:
             if one.key not in settled:
                 try:
-                    settled[one.key] = _compared(stretches, _refined(stretches, one, policy), policy)
+                    refined = _refined(stretches, one, policy)
+                    settled[one.key] = refined if is_body else _settled(stretches, refined, policy)
                 except np.linalg.LinAlgError:  # what would be learnt leaves nothing that can be solved
                     continue
         grown = [one for one in settled.values() if one.key > leading.key and _gains(one, leading) > needed]
@@ -131,7 +133,7 @@ def challenge(stretches: Sequence[Stretch], point: Point, policy: Policy) -> Cha
         if not grown and not others:
             break
         leading = max((*grown, *others), key=lambda one: one.log_posterior)
-        if isinstance(stretches[0], BodyStretch):
+        if is_body:
             leading = _settled(stretches, leading, policy)
     rivals = sorted((one for one in settled.values() if one is not leading), key=lambda one: -one.log_posterior)
     return Challenged(leading, tuple(rivals))
@@ -208,14 +210,6 @@ def _refined(stretches: Sequence[Stretch], found: Fit, policy: Policy) -> Fit:
     leader = screen.refined(Leader(-np.inf, last.family, last), frozenset({last.key}))
     again = _fitted(stretches, replace(found.point, causes=(*others, leader.cause)), policy)
     return max([found, *again], key=lambda one: one.log_posterior)
-
-
-def _compared(stretches: Sequence[Stretch], found: Fit, policy: Policy) -> Fit:
-    """Return a fit as sets are compared: under the noise that it leaves, or that of the leading set for a body.
-
-    The evidence of a body is that of a misfit of its noise, and no such evidence compares with that of another one.
-    """
-    return found if isinstance(stretches[0], BodyStretch) else _settled(stretches, found, policy)
 
 
 def _settled(stretches: Sequence[Stretch], found: Fit, policy: Policy) -> Fit:

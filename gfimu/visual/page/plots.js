@@ -105,9 +105,6 @@
 
   const swatch = (colour) => element("i", { class: "swatch", style: `background: var(${colour})` });
 
-  // A piece of a line as it is drawn: full, dashed or dotted.
-  const lineSample = (colour, dash) => element("i", { class: "line", style: `border-top: 3px ${["solid", "dashed", "dotted"][dash % 3]} var(${colour})` });
-
   function colour(name) {
     return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
   }
@@ -461,119 +458,6 @@
     ctx.restore();
   }
 
-  // ---------------------------------------------------------------- mean residual over a quantity, before and after
-
-  class DependencePlot {
-    constructor(host, spec, columns, key) {
-      this.spec = spec;
-      this.chosen = spec.strongest[0];
-      const { channels } = spec;
-      const parts = { x: spec.x.column, before: spec.before, after: spec.after };
-      this.read = (name, channel) => columns[parts[name]].slice(channel * spec.bins, (channel + 1) * spec.bins);
-      const every = channels.keys(), xs = [...every].map((channel) => this.read("x", channel));
-      const [low, high] = extent(xs, 0, xs[0].length - 1);
-      this.view = new View(Number.isFinite(low) ? low : 0, Number.isFinite(high) ? high : 1, () => this.fit());
-      this.readout = element("span", { class: "readout" });
-      const pair = element("div", {
-        class: "pair", tabindex: "0", role: "group", "aria-roledescription": "plot",
-        "aria-label": `Mean residual over ${spec.x.label}, before and after. ${KEYS} Arrows up and down choose the channel.`,
-      });
-      this.buttons = new Map(spec.strongest.map((channel) => {
-        const { name, chip, dash } = channels[channel];
-        return [channel, element("button", { type: "button", title: `choose ${name}`, onclick: () => this.choose(channel) }, lineSample(`--chip-${chip}`, dash), name)];
-      }));
-      host.append(element("div", { class: "toolbar" }, zoomButtons(this.view),
-        element("span", { class: "buttons", role: "group", "aria-label": "channels that follow it most" }, ...this.buttons.values()), this.readout), pair);
-      listenToKeys(pair, this.view, (steps) => this.moveCursor(steps), (step) => {
-        this.choose((this.chosen + step + channels.length) % channels.length);
-      });
-      this.plots = ["before", "after"].map((name) => {
-        const box = element("div", { class: "panel" }, element("div", { class: "head" }, element("b", {}, name)));
-        pair.append(box);
-        const plot = newPlot(box, this.view, {
-          height: 190, key, focus: true, data: this.table(name),
-          series: [{}, ...channels.map((channel, number) => ({
-            stroke: () => (number === this.chosen || spec.strongest.includes(number) ? colour(`--chip-${channel.chip}`) : faded("--noise", 0.4)),
-            width: 1.3, dash: [null, [7, 3], [2, 3]][channel.dash % 3] ?? undefined, points: { show: false }, spanGaps: true,
-          }))],
-          axes: [axis(2, spec.x.label), axis(3, name === "before" ? spec.label : null)],
-          hooks: {
-            setSeries: [(_, series) => { if (series !== null && series > 0) this.choose(series - 1); }],
-            setCursor: [() => this.say()],
-          },
-        });
-        onWidth(box, (width) => plot.setSize({ width, height: plot.height }));
-        return plot;
-      });
-      this.fit();
-      this.choose(this.chosen);
-    }
-
-    // Lines of all channels on one sorted axis, as uPlot wants them; a channel without a bin there has null.
-    table(name) {
-      const tables = this.spec.channels.map((_, channel) => {
-        const places = [], values = [], own = this.read(name, channel);
-        this.read("x", channel).forEach((at, k) => {
-          if (at !== null && own[k] !== null) {
-            places.push(at);
-            values.push(own[k]);
-          }
-        });
-        return [places, values];
-      });
-      const joined = uPlot.join(tables.map(([places, values]) => [places, values]));
-      return joined.map((column) => Array.from(column, (one) => one ?? null));
-    }
-
-    choose(channel) {
-      if (channel === this.chosen && this.marked) return;
-      this.marked = true;
-      this.chosen = channel;
-      this.buttons.forEach((one, of) => one.setAttribute("aria-pressed", String(of === channel)));
-      for (const plot of this.plots ?? []) {
-        plot.series.forEach((series, k) => { if (k) series.width = k - 1 === channel ? 2.4 : 1.3; });
-        plot.redraw(false);
-      }
-      this.say();
-    }
-
-    fit() {
-      const lines = this.plots.flatMap((plot) => plot.data.slice(1).map((values) => values.filter((_, k) => {
-        const at = plot.data[0][k];
-        return at >= this.view.range[0] && at <= this.view.range[1];
-      })));
-      const range = this.view.height ?? spread(extent(lines, 0, Math.max(0, ...lines.map((one) => one.length)) - 1));
-      this.plots.forEach((plot) => setRanges(plot, this.view.range, range));
-    }
-
-    moveCursor(steps) {
-      const plot = this.plots[0], x = plot.data[0];
-      if (!x.length) return;
-      const index = stepped(x, this.view, plot.cursor.idx, steps);
-      plot.setCursor({ left: plot.valToPos(x[index], "x"), top: plot.over.clientHeight / 2 });
-    }
-
-    say() {
-      if (!this.plots || this.plots.length < 2) return;
-      const { name, unit } = this.spec.x, plot = this.plots.find((one) => one.cursor.idx !== null && one.cursor.idx !== undefined);
-      const at = plot ? plot.data[0][plot.cursor.idx] : null;
-      const words = [];
-      if (at !== null && at !== undefined) {
-        const nearest = (line) => {
-          const places = this.read("x", this.chosen), own = this.read(line, this.chosen);
-          let best = null;
-          places.forEach((place, k) => {
-            if (place !== null && own[k] !== null && (best === null || Math.abs(place - at) < Math.abs(places[best] - at))) best = k;
-          });
-          return best === null ? null : own[best];
-        };
-        words.push(this.spec.channels[this.chosen].name, `${name} = ${numeral(at)} ${unit}:`, `before ${numeral(nearest("before"))}, after ${numeral(nearest("after"))} ${this.spec.unit}`);
-      }
-      const { chip, dash } = this.spec.channels[this.chosen];
-      this.readout.replaceChildren(...(words.length ? [lineSample(`--chip-${chip}`, dash), words.join(" ")] : []));
-    }
-  }
-
   // ---------------------------------------------------------------- spectrum
 
   class SpectrumPlot {
@@ -656,7 +540,7 @@
 
   // ---------------------------------------------------------------- start
 
-  const KINDS = { residual: ResidualPlot, dependence: DependencePlot, spectrum: SpectrumPlot };
+  const KINDS = { residual: ResidualPlot, spectrum: SpectrumPlot };
 
   async function start() {
     const spec = JSON.parse(document.getElementById("plots").textContent);

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,12 +14,20 @@ from scipy.spatial import ConvexHull, QhullError
 
 from gfimu.array.array import AccelerometerArray
 from gfimu.array.turning_axis import TurningAxis
-from gfimu.base.results.colours import INK, NOISE_ON_PAPER, SPIN_AXIS_ON_PAPER, STYLES, chip_colour, css
+from gfimu.base.results.colours import (
+    BEFORE_ON_PAPER,
+    INK,
+    NOISE_ON_PAPER,
+    SPIN_AXIS_ON_PAPER,
+    STYLES,
+    chip_colour,
+    css,
+)
 from gfimu.visual.colours import AXES, METAL
 from gfimu.visual.rig.package import Package, drawing_size, package_of
 from gfimu.visual.rig.words import short_name
 
-__all__ = ["array_figure", "channel_style"]
+__all__ = ["Marked", "array_figure", "channel_style"]
 
 _MM = 1000.0
 _WIDTH = 5.5  # inches of one view
@@ -27,8 +36,18 @@ _MOST_CHANNEL_NAMES, _LONGEST_CHANNEL_NAME = 12, 10
 _ACROSS = 0.15  # an axis whose drawn length is below this share points at or away from the reader
 _NAME_AWAY = 0.19  # distance of a chip's name from it, in sizes of the drawing: 14 points on this paper
 _NAME_WEIGHT = 0.45
+_MARK, _MARK_WIDTH = css(BEFORE_ON_PAPER), 2.4
 _OBLIQUE = np.array([[0.77, 0.64, 0.0], [-0.27, 0.33, 0.9]])  # rows: right and up on paper, body frame
 _TOP = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+
+
+@dataclass(frozen=True)
+class Marked:
+    """What a drawing marks: chips by number, the package, the axis of rotation."""
+
+    chips: frozenset[int] = frozenset()
+    package: bool = False
+    axis: bool = False
 
 
 def channel_style(array: AccelerometerArray, column: int) -> tuple[str, str | tuple[float, tuple[float, ...]]]:
@@ -45,6 +64,7 @@ def array_figure(
     gravity: NDArray[np.float64] | None = None,
     gravity_name: str = "gravity",
     views: Sequence[str] = ("side", "above"),
+    marked: Marked = Marked(),
 ) -> Figure:
     """Draw an array in its body frame, seen obliquely and from above.
 
@@ -60,11 +80,13 @@ def array_figure(
         What its arrow is called.
     views : sequence of {"side", "above"}
         What is drawn, from left to right.
+    marked : Marked
+        What stands out, in the colour of errors.
     """
     figure = Figure(figsize=(_WIDTH * len(views), 4.6), layout="constrained")
     spin = array.turning_axis if axis is None else axis
     for panel, view in zip(figure.subplots(1, len(views), squeeze=False)[0], views, strict=True):
-        _draw(panel, array, _OBLIQUE if view == "side" else _TOP, spin)
+        _draw(panel, array, _OBLIQUE if view == "side" else _TOP, spin, marked)
         panel.set_title(_TITLES[view], loc="left", fontsize=10)
         panel.set_aspect("equal", adjustable="datalim")
         panel.margins(0.17)
@@ -87,15 +109,19 @@ def array_figure(
     return figure
 
 
-def _draw(panel: Axes, array: AccelerometerArray, view: NDArray[np.float64], spin: TurningAxis | None) -> None:
+def _draw(
+    panel: Axes, array: AccelerometerArray, view: NDArray[np.float64], spin: TurningAxis | None, marked: Marked
+) -> None:
     """Draw package, axis of rotation, sensing axes and chips in one projection, view (2, 3), body frame to paper."""
     package, size = package_of(array), drawing_size(array)
     outline = _outline(package) @ view.T * _MM
     panel.fill(*_hull(outline).T, facecolor=css(METAL), alpha=0.35, edgecolor=css(NOISE_ON_PAPER), linewidth=0.8)
+    if marked.package:
+        panel.fill(*_hull(outline).T, fill=False, edgecolor=_MARK, linewidth=_MARK_WIDTH)
     for start, end in _edges(package):
         panel.plot(*(np.array([start, end]) @ view.T * _MM).T, color=css(NOISE_ON_PAPER), linewidth=0.6)
     if spin is not None:
-        _axis_line(panel, spin, package, view, size)
+        _axis_line(panel, spin, package, view, size, is_marked=marked.axis)
     names_channels = array.n_channels <= _MOST_CHANNEL_NAMES and max(map(len, array.channels)) <= _LONGEST_CHANNEL_NAME
     for column, channel in enumerate(array.channels):
         _sensing_axis(panel, array, column, view, 0.42 * _axis_length(array, size), channel if names_channels else "")
@@ -103,6 +129,8 @@ def _draw(panel: Axes, array: AccelerometerArray, view: NDArray[np.float64], spi
     for index, place in enumerate(places):
         colour = css(chip_colour(index, on_paper=True))
         panel.plot(*place, "s", color=colour, markersize=7 if len(places) <= 16 else 5, markeredgecolor="white")
+        if index in marked.chips:
+            panel.plot(*place, "o", color=_MARK, markersize=18, fillstyle="none", markeredgewidth=_MARK_WIDTH)
     length = 0.42 * _axis_length(array, size)
     arrows = (
         (array.positions[:, None] + np.linspace(0.2, 1.3, 6)[:, None] * length * array.axes[:, None]) @ view.T * _MM
@@ -141,15 +169,17 @@ def _sensing_axis(
         )  # fmt: skip
 
 
-def _axis_line(panel: Axes, spin: TurningAxis, package: Package, view: NDArray[np.float64], size: float) -> None:
-    colour = css(SPIN_AXIS_ON_PAPER)
+def _axis_line(
+    panel: Axes, spin: TurningAxis, package: Package, view: NDArray[np.float64], size: float, *, is_marked: bool
+) -> None:
+    colour = _MARK if is_marked else css(SPIN_AXIS_ON_PAPER)
     foot = spin.point + ((package.centre - spin.point) @ spin.direction) * spin.direction
     ends = np.array([foot - 1.25 * size * spin.direction, foot + 1.25 * size * spin.direction]) @ view.T * _MM
     if np.hypot(*(ends[1] - ends[0])) < 2 * _ACROSS * size * _MM:
         panel.plot(*ends[0], marker="o", markersize=9, color=colour, fillstyle="none")
         panel.plot(*ends[0], marker=".", markersize=4, color=colour)
     else:
-        panel.plot(*ends.T, color=colour, linestyle="-.", linewidth=1.4)
+        panel.plot(*ends.T, color=colour, linestyle="-.", linewidth=_MARK_WIDTH if is_marked else 1.4)
 
 
 def _triad(panel: Axes, array: AccelerometerArray, gravity: NDArray[np.float64] | None, gravity_name: str) -> None:

@@ -15,12 +15,11 @@ from scipy.fft import rfft
 from scipy.signal import welch
 from scipy.stats import gamma
 
-from gfimu.diagnosis.criticism.views.dependence import listed
 from gfimu.diagnosis.criticism.views.run_view import RunView
 from gfimu.diagnosis.data.cosine_basis import CosineBasis
 from gfimu.diagnosis.policy import Policy
 
-__all__ = ["ResidualSpectrum", "SpectralLine", "order_spectrum", "time_spectrum"]
+__all__ = ["ResidualSpectrum", "SpectralLine", "listed", "order_spectrum", "time_spectrum"]
 
 _CELLS_PER_TURN = 64  # numerical: four cells in a cycle of the highest order
 _FEWEST_TURNS = 3.0  # numerical: two cycles per revolution are then well apart
@@ -29,6 +28,13 @@ _FEWEST_CYCLES = 10  # numerical: of a tone in a run; slow functions follow what
 _NEIGHBOURS = 50  # numerical: frequencies whose median is the level of the noise
 _NARROW, _WIDE = 2, 16  # numerical: frequencies on either side that a line and a hump are
 _LONGEST_WINDOW = 2048  # numerical: samples of a periodogram that is averaged
+
+
+def listed(names: Sequence[str], most: int = 4) -> str:
+    """Return names in words: the first few, and how many more."""
+    if len(names) > most:
+        return f"{', '.join(names[:most])} and {len(names) - most} more"
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import dct
 
-from gfimu.diagnosis.criticism.views.dependence import Dependence, Fingerprint, dependences, fingerprint, listed
-from gfimu.diagnosis.criticism.views.residual_spectrum import ResidualSpectrum, order_spectrum, time_spectrum
+from gfimu.diagnosis.criticism.views.error_form import ErrorForm, error_form
+from gfimu.diagnosis.criticism.views.residual_spectrum import ResidualSpectrum, listed, order_spectrum, time_spectrum
 from gfimu.diagnosis.criticism.views.run_view import RunView
 from gfimu.diagnosis.criticism.views.whiteness import cumulative_periodogram, ljung_box, standardise, whitening_gain
 from gfimu.diagnosis.policy import Policy
@@ -66,48 +66,25 @@ class ResidualViews:
         Against the noise.
     whiteness : Whiteness
         Against no correlation.
-    dependences : tuple of Dependence
-        On time, rate, rate squared, acceleration, reading, temperature, and orders of the table's angle.
+    form : ErrorForm or None
+        What the error of one channel goes with; None where nothing orders it.
     spectrum : ResidualSpectrum
         In Hz.
     orders : ResidualSpectrum or None
         In cycles per revolution; None if the table hardly turns.
-    fingerprint : Fingerprint
-        Channels against basic terms.
     """
 
     size: ResidualSize
     whiteness: Whiteness
-    dependences: tuple[Dependence, ...]
+    form: ErrorForm | None
     spectrum: ResidualSpectrum
     orders: ResidualSpectrum | None
-    fingerprint: Fingerprint
 
     @property
     def sentences(self) -> tuple[str, ...]:
         """The sentences of all views that matter."""
-        angle = self.strongest_order
-        views = (self.size, self.whiteness, *self.dependences, self.spectrum, self.orders)
-        worded = [view for view in views if view is not None and view.sentence]
-        # Twelve orders of the angle are one view: its strongest speaks.
-        return tuple(
-            view.sentence
-            for view in worded
-            if not isinstance(view, Dependence) or view.view != "angle" or view is angle
-        )
-
-    @property
-    def strongest_order(self) -> Dependence | None:
-        """The order of the table's angle that the residual follows most."""
-        orders = [dependence for dependence in self.dependences if dependence.view == "angle"]
-        spoken = [order for order in orders if order.sentence] or orders
-        return max(spoken, key=lambda one: one.strength, default=None)
-
-    def by_view(self, view: str) -> Dependence | None:
-        """Return the dependence shown by a view; of the angle, the strongest order."""
-        if view == "angle":
-            return self.strongest_order
-        return next((dependence for dependence in self.dependences if dependence.view == view), None)
+        views = (self.size, self.whiteness, self.spectrum, self.orders)
+        return tuple(view.sentence for view in views if view is not None and view.sentence)
 
 
 def residual_views(run: RunView, channels: Sequence[str], *, bias_instability: float = 0.0) -> ResidualViews:
@@ -133,10 +110,9 @@ def residual_views(run: RunView, channels: Sequence[str], *, bias_instability: f
     return ResidualViews(
         _size(run, names, bias_instability, before, after),
         _whiteness(names, period, *pair),
-        dependences(run, names, gain, before, after),
+        error_form(run, names),
         spectrum,
         order_spectrum(run, names, (before, after), pair, spectrum.line_before),
-        fingerprint(run, names, gain, before, after),
     )
 
 

@@ -1,4 +1,4 @@
-"""Tables of the report by channel: numbers, lengths of bars and colours follow the residual."""
+"""The table of the report by channel: numbers and lengths of bars follow the residual."""
 
 from __future__ import annotations
 
@@ -9,9 +9,8 @@ import pytest
 from made_runs import PERIOD, made_view
 
 from gfimu import AccelerometerArray, Chip
-from gfimu.diagnosis.criticism.views.dependence import Fingerprint
 from gfimu.diagnosis.criticism.views.residuals import residual_views
-from gfimu.diagnosis.report.channel_tables import channel_bars, fingerprint_rows
+from gfimu.diagnosis.report.channel_tables import channel_bars
 
 ARRAY = AccelerometerArray(
     "four", (Chip("a1", np.zeros(3), np.eye(3)), Chip("a2", np.array([0.1, 0.0, 0.0]), np.eye(3)[:1]))
@@ -50,32 +49,3 @@ def test_a_channel_without_a_sample_has_a_dash_and_no_bar(size):
     values = np.array([0.2, np.nan, 0.05, 0.1])
     row = channel_bars(replace(size, before=values, after=values), ARRAY).rows[1]
     assert (row.before, row.bar_before) == ("–", 0.0)
-
-
-def test_the_fingerprint_is_empty_within_chance_and_red_and_blue_beyond():
-    before = np.array([[2.9, -2.9, np.nan], [4.0, -4.0, 300.0]])
-    quiet, loud = fingerprint_rows(Fingerprint(("a11", "a12"), ("ω", "α", "T"), before, np.zeros((2, 3))))
-    assert {cell.text for cell in (*quiet.before, *quiet.after, *loud.after)} == {""}
-    assert [cell.text for cell in loud.before] == ["4", "−4", "300"]
-    red, blue, deep = (parts(cell.ground) for cell in loud.before)
-    assert red[0] > red[2]
-    assert blue[0] < blue[2]
-    assert sum(deep) < sum(red)
-    assert loud.before[2].ink == "#ffffff"
-    for cell in loud.before:
-        assert contrast(cell.ground, cell.ink) > 4.5  # WCAG 2.2, level AA
-
-
-def parts(colour):
-    return [int(colour[k : k + 2], 16) for k in (1, 3, 5)]
-
-
-def contrast(first, second):
-    def luminance(colour):
-        linear = [
-            one / 12.92 if one <= 0.04045 else ((one + 0.055) / 1.055) ** 2.4 for one in np.divide(parts(colour), 255)
-        ]
-        return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
-
-    low, high = sorted(map(luminance, (first, second)))
-    return (high + 0.05) / (low + 0.05)

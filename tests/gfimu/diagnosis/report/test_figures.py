@@ -20,6 +20,7 @@ from gfimu.diagnosis import DrawnRig
 from gfimu.diagnosis.criticism.views.residuals import residual_views
 from gfimu.diagnosis.report import figures
 from gfimu.visual.page.svg import themed
+from gfimu.visual.rig.figure import Marked
 
 CHANNELS = ("a11", "a12", "a13", "a21")
 ARRAY = AccelerometerArray(
@@ -44,14 +45,15 @@ def texts(svg):
 
 
 def drawn(views, view):
-    dependence = views.by_view("rate squared")
+    seen_from = DrawnRig().seen_from(ARRAY, view)
     return {
         "trace": figures.trace_figure(view, views.size),
         "channels": figures.channels_figure(view, views.size, ARRAY),
-        "dependence": figures.dependence_figure(dependence, ARRAY),
+        "form": figures.form_figure(views.form),
+        "marked": figures.marked_figure(ARRAY, *seen_from, Marked(frozenset({1}), True, True)),
         "spectrum": figures.spectrum_figure(views.spectrum),
         "whiteness": figures.whiteness_figure(views.whiteness),
-        **dict(zip(("rig", "rig above"), figures.rig_figures(ARRAY, *DrawnRig().seen_from(ARRAY, view)), strict=True)),
+        **dict(zip(("rig", "rig above"), figures.rig_figures(ARRAY, *seen_from), strict=True)),
     }
 
 
@@ -61,7 +63,8 @@ def test_every_figure_is_well_formed_labelled_and_the_same_each_time(views, view
     labels = {
         "trace": {"measured − predicted, channel a11", "time, s", "m/s²"},
         "channels": {*CHANNELS, "time, s"},
-        "dependence": {"ω², rad²/s²", "mean residual, m/s²", "a11"},
+        "form": {"ω, rad/s", "a11, m/s²", "extended simulation", "measured − given simulation, ±2σ"},
+        "marked": {*CHANNELS, "a1", "a2", "gravity", "axis of rotation"},
         "spectrum": {"frequency, Hz", "amplitude density, m/s²/√Hz", "before", "after", "noise"},
         "whiteness": {"frequency, Hz", "share of the power below"},
         "rig": {*CHANNELS, "a1", "a2", "gravity", "axis of rotation", "x", "y", "z"},
@@ -76,16 +79,16 @@ def test_every_figure_is_well_formed_labelled_and_the_same_each_time(views, view
 
 def test_before_after_and_the_chips_have_their_colours_in_every_figure(views, view):
     found = drawn(views, view)
-    for name in ("trace", "spectrum"):
+    for name in ("trace", "form", "spectrum"):
         assert css(BEFORE_ON_PAPER) in found[name]
         assert css(AFTER_ON_PAPER) in found[name]
-    for name in ("channels", "dependence", "rig"):
+    for name in ("channels", "marked", "rig"):
         for chip in range(2):
             assert css(chip_colour(chip, on_paper=True)) in found[name], name
 
 
 def test_a_figure_takes_the_colours_of_the_page(views, view):
-    svg = themed(drawn(views, view)["dependence"], 2)
+    svg = themed(drawn(views, view)["channels"], 2)
     assert {"var(--chip-0)", "var(--chip-1)", "var(--ink)", "var(--noise)", "var(--card)"} <= set(
         re.findall(r"var\([^)]+\)", svg)
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -78,9 +79,9 @@ def css(colour):
 
 
 def test_plots_stand_in_place_of_the_pictures(page):
-    assert page.run("document.querySelectorAll('.zooming canvas').length") >= 15
+    assert page.run("document.querySelectorAll('.zooming canvas').length") == 4  # three channels, one spectrum
     assert page.run("[...document.querySelectorAll('.still')].every(one => !one.checkVisibility())")
-    assert page.run("document.querySelectorAll('figure svg').length") >= 12
+    assert page.run("document.querySelectorAll('figure svg').length") == 8
     found = pixels(page)
     assert found[css(PAGE["light"]["before"])] > 200
     assert found[css(PAGE["light"]["after"])] > 200
@@ -160,7 +161,7 @@ def test_tab_reaches_every_control(page):
         f"(all => {{ all.forEach((one, k) => one.dataset.place = k); return all.length; }})"
         f"([...document.querySelectorAll(`{controls}`)].filter(one => one.checkVisibility()))"
     )
-    assert count > 50
+    assert count > 40
     seen, outlined = [], []
     for _ in range(count + 5):
         page.press("Tab")
@@ -265,22 +266,19 @@ def test_tables_of_channels_and_sizes_are_whole_on_a_telephone(page):
         assert page.run(f"document.querySelectorAll('{cells}').length") > 1
         right = f"Math.max(...[...document.querySelectorAll('{cells}')].map(one => one.getBoundingClientRect().right))"
         assert page.run(right) <= 400
-    assert page.run("parseFloat(getComputedStyle(document.querySelector('table.fingerprint td')).fontSize)") >= 12
 
 
-def test_every_coloured_line_of_a_dependence_has_its_name(page):
-    """The channels that follow a quantity most are buttons with a piece of their line; one is chosen."""
-    host = "document.querySelector('[data-plot=over-the-rate]')"
-    names = f"[...{host}.querySelectorAll('[aria-label=\"channels that follow it most\"] button')]"
-    assert page.run(f"{names}.length") == 4
-    assert page.run(f"{names}.every(one => one.querySelector('.line').getBoundingClientRect().width > 10)")
-    page.run(f"{names}[2].click()")
-    assert page.run(f"{names}.map(one => one.getAttribute('aria-pressed'))") == ["false", "false", "true", "false"]
-
-
-def test_ticks_of_a_spectrum_are_round_numbers(page):
-    plot = "document.querySelector('[data-plot=over-frequency]')"
-    drawn = page.run(
+def test_ticks_of_a_spectrum_are_round_numbers(browser, tmp_path):
+    diagnosis = made_diagnosis("explained")
+    (run,) = diagnosis.runs
+    ringing = run.measured + 0.2 * np.sin(2 * np.pi * 11.3 * run.t)[:, None]
+    file = tmp_path / "ringing.html"
+    file.write_text(report_html(replace(diagnosis, runs=(replace(run, measured=ringing),))), encoding="utf-8")
+    browser.open(file)
+    browser.wait(READY)
+    browser.settle()
+    plot = "document.querySelector('[data-plot=a-line-over-frequency]')"
+    drawn = browser.run(
         "(() => { const real = CanvasRenderingContext2D.prototype.fillText, words = [];"
         " CanvasRenderingContext2D.prototype.fillText = function (text, ...more) { words.push(text);"
         " return real.call(this, text, ...more); };"

@@ -84,18 +84,6 @@ def test_of_a_long_run_every_peak_is_stored(view, views, monkeypatch):
     assert abs(time[int(np.argmax(stored))] - T[1234]) < 20 * PERIOD
 
 
-def test_a_dependence_holds_each_channel_after_the_other(views):
-    data = Kept()
-    dependence = views.by_view("rate squared")
-    plot = zooming.dependence_plot(dependence, ARRAY, data)
-    bins = plot["bins"]
-    assert plot["strongest"][0] == 0
-    for column in range(4):
-        part = slice(column * bins, (column + 1) * bins)
-        np.testing.assert_array_equal(data.values[plot["before"]][part], dependence.before[:, column])
-        np.testing.assert_array_equal(data.values[plot["x"]["column"]][part], dependence.centres[:, column])
-
-
 def test_a_spectrum_is_stored_by_its_logarithm(views):
     data = Kept()
     plot = zooming.spectrum_plot(views.spectrum, data)
