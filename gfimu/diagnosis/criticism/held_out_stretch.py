@@ -96,15 +96,16 @@ def measure(
         Thresholds.
     """
     array, index = extended.model.array, extended.index
+    carried = [cause for cause in causes if not is_of_one_recording(cause.family)]
     if isinstance(extended, BodyStretch) and isinstance(nominal, BodyStretch):
-        return _measured_body(nominal, extended, effects_of(causes, array, index), drive, levels, unexplained)
+        own, others = effects_of(causes, array, index), effects_of(carried, array, index)
+        return _measured_body(nominal, extended, own, others, drive, levels, unexplained)
 
     def beside(some: Sequence[Cause]) -> Stretch:
         return replace(extended, known=(*extended.known, *effects_of(some, array, index)))
 
     whole = beside(causes)
     before, after = (_at_best(stretch, drive, levels, policy) for stretch in (nominal, whole))
-    carried = [cause for cause in causes if not is_of_one_recording(cause.family)]
     other = after
     if len(carried) < len(causes):
         other = _at_best(beside(carried), drive, levels, policy)
@@ -132,20 +133,22 @@ def _measured_body(
     nominal: BodyStretch,
     extended: BodyStretch,
     effects: Sequence[Effect],
+    carried: Sequence[Effect],
     drive: HandDrive,
     levels: BodyNoise,
     unexplained: float,
 ) -> Measured:
-    """Measure effects on a free body, whose motion between them is marginalised before and after alike."""
+    """Measure effects on a free body, all and those that another recording has, its motion marginalised alike."""
     plain = replace(levels, misfit=1.0)
     before, after = condition(nominal, drive, (), plain), condition(extended, drive, effects, plain)
+    other = after if len(carried) == len(effects) else condition(extended, drive, carried, plain)
     use = extended.counted[:, None] & extended.run.valid
     gains = (0.5 * (before.squares - after.squares) / np.maximum(extended.count, 1))[extended.on]
     whole = len(gains) // _BLOCK * _BLOCK
     return Measured(
         before=before.objective,
         after=after.objective,
-        carried=after.objective,
+        carried=other.objective,
         floor=float(extended.observations),
         floor_variance=2.0 * extended.observations,
         fitted=unexplained * levels.misfit * extended.observations,

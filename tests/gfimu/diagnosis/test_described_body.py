@@ -54,6 +54,7 @@ def test_an_error_of_a_body_has_its_place_and_dependence(tmp_path, change, place
     assert found.residual.rms_after < 1.08 * found.residual.noise_floor
     if dependence == "t":  # a function of absolute time predicts no other recording
         assert not found.twin.effects
+        assert found.gain.share_in_any_recording < 0.1
         return
     assert [effect.parameters["dependence"] for effect in found.twin.effects] == [dependence]
     write_diagnosis(tmp_path, found)
