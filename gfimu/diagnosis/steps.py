@@ -21,6 +21,7 @@ from gfimu.diagnosis.search.challenge import challenged
 from gfimu.diagnosis.search.explain import Explanation, reduced
 from gfimu.diagnosis.search.long_run import understand_any_length
 from gfimu.diagnosis.search.nuisance_models import Understanding
+from gfimu.diagnosis.terms.located.policy import LOCATED
 from gfimu.diagnosis.terms.located.term import is_located
 from gfimu.diagnosis.verdict.conclude import conclude, is_dominant, is_unknown, named_causes
 from gfimu.diagnosis.verdict.gate import impossible_sizes, judge, measurable
@@ -90,7 +91,12 @@ class Steps:
         if not is_dominant(understanding.explanation, left, policy):
             progress(0.92, "hold out")
             try:
+                before = understanding.explanation.best.log_posterior
                 understanding, withdrawn = self._gated(understanding)
+                if before - understanding.explanation.best.log_posterior > LOCATED.free_odds:
+                    # What explained so much is real, but it is not what its name says.
+                    understanding, again = self._gated(self.challenged(understanding))
+                    withdrawn, self.stage = [*withdrawn, *again], STAGES[3]
                 left = self._left(understanding.explanation) if withdrawn else left
                 progress(0.97, "measure the gain")
                 gain = self._gain(understanding.explanation, understanding.explanation.best)

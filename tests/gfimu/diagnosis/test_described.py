@@ -96,3 +96,15 @@ def test_named_causes_need_no_functions_without_a_name():
     found = diagnose([measure(np.random.default_rng(7), WHOLE, [tilt], SETTING)], WHOLE)
     assert found.verdict == "explained"
     assert [effect.name for effect in found.twin.effects] == ["table_tilt"]
+
+
+def test_a_clock_whose_rate_drifts_is_late_in_time_and_no_clock_of_another_rate():
+    """A constant rate error explains most of it, and predicts no other part of the recording."""
+
+    def late(t, spin, readings, reference):
+        reference -= spin.acceleration * 0.02 * (t / SETTING.duration) ** 2
+
+    found = diagnose([recorded(3, late)], WHOLE)
+    assert found.verdict == "unknown"
+    assert [(cause.unlisted.place, cause.unlisted.what) for cause in found.causes] == [("clock", "late")]
+    assert found.unexplained.log_odds < 8
