@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,13 +18,13 @@ from gfimu.diagnosis.search.explain import Explanation
 from gfimu.diagnosis.terms.located.term import is_located
 from gfimu.diagnosis.verdict.located import located_cause
 from gfimu.diagnosis.verdict.parts import NamedCause
+from gfimu.model.located.effect import UNLISTED
 from gfimu.model.world_model import Effect, WorldModel, is_of_one_recording
 
 __all__ = ["Extension", "extension", "that_predict"]
 
 _NOT_PREDICTED = (
-    "What has no name is not all in the extended twin: from the reference alone the simulation predicts these data "
-    "better without it."
+    "{} is not all in the extended twin: from the reference alone the simulation predicts these data better without it."
 )
 
 
@@ -47,8 +47,8 @@ def extension(
 ) -> Extension:
     """Extend the twin of an explanation.
 
-    Causes of absolute time stay out where nothing confirms them, and so do errors without a name with which the
-    reference alone predicts the runs worse.
+    Causes of absolute time stay out where nothing confirms them, and so do errors without a name, and what was fitted
+    beside causes of absolute time, with which the reference alone predicts the runs worse.
 
     Parameters
     ----------
@@ -79,18 +79,24 @@ def extension(
             described.append(model.described({**effect.parameters, "text": found.text, **table}))
         else:
             named.append(effect)
-    twin = model.extended([*_library_effects(model, faults), *_residue(explanation), *named])
+    twin = model.extended([*_library_effects(model, faults), *_residue(explanation)])
     is_body = isinstance(explanation.stretches[0], BodyStretch)  # of which no reference gives the specific force
-    kept = described if is_body else that_predict(twin, described, prepared)
-    names = dict.fromkeys("What has no name" if is_located(cause) else cause.name for cause in of_time)
-    sentences = [_of_absolute_time([*names])] if names else []
-    if len(kept) < len(described):
-        sentences.append(_NOT_PREDICTED)
-    return Extension(twin.extended(kept), tuple(sentences))
+    # A size that was fitted beside what is left out may be wrong without it.
+    doubted = [*named, *described] if of_time else described
+    sure = [] if of_time else named
+    kept = doubted if is_body else that_predict(twin.extended(sure), doubted, prepared)
+    sentences = (
+        [_of_absolute_time(_said(UNLISTED if is_located(cause) else cause.name for cause in of_time))]
+        if of_time
+        else []
+    )
+    if lost := _said(effect.name for effect in doubted if effect not in kept):
+        sentences.append(_NOT_PREDICTED.format(" and ".join(lost)))
+    return Extension(twin.extended([*sure, *kept]), tuple(sentences))
 
 
-def that_predict(twin: WorldModel, described: Sequence[Effect], prepared: PreparedRuns) -> list[Effect]:
-    """Return the errors without a name with which a twin predicts the runs, from their reference alone, best.
+def that_predict(twin: WorldModel, doubted: Sequence[Effect], prepared: PreparedRuns) -> list[Effect]:
+    """Return the effects with which a twin predicts the runs, from their reference alone, best.
 
     A function of what a reference does not tell is right and yet of no use for another recording, such as many waves
     per revolution where the reference gives the angle to some degrees, or where a tachometer stands still.
@@ -104,7 +110,7 @@ def that_predict(twin: WorldModel, described: Sequence[Effect], prepared: Prepar
             return np.inf
         return sum(float(np.sum(miss[run.valid] ** 2)) for miss, run in zip(misses, prepared.runs, strict=True))
 
-    kept = list(described)
+    kept = list(doubted)
     least = squares(kept) if kept else 0.0
     while kept:
         fewer = [[other for other in kept if other is not one] for one in kept]
@@ -114,6 +120,11 @@ def that_predict(twin: WorldModel, described: Sequence[Effect], prepared: Prepar
         least = min(sums)
         kept = fewer[sums.index(least)]
     return kept
+
+
+def _said(names: Iterable[str]) -> list[str]:
+    """Return names of causes or effects, each once; those of places are no names."""
+    return [*dict.fromkeys("What has no name" if name == UNLISTED else name for name in names)]
 
 
 def _of_absolute_time(names: Sequence[str]) -> str:

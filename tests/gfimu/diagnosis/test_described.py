@@ -98,13 +98,25 @@ def test_named_causes_need_no_functions_without_a_name():
     assert [effect.name for effect in found.twin.effects] == ["table_tilt"]
 
 
-def test_a_clock_whose_rate_drifts_is_late_in_time_and_no_clock_of_another_rate():
+def test_a_clock_that_warms_up_is_late_in_time_and_no_clock_of_another_rate():
     """A constant rate error explains most of it, and predicts no other part of the recording."""
 
     def late(t, spin, readings, reference):
-        reference -= spin.acceleration * 0.02 * (t / SETTING.duration) ** 2
+        reference -= spin.acceleration * 6e-4 * (t - 6.0 * -np.expm1(-t / 6.0))
 
     found = diagnose([recorded(3, late)], WHOLE)
     assert found.verdict == "unknown"
     assert [(cause.unlisted.place, cause.unlisted.what) for cause in found.causes] == [("clock", "late")]
     assert found.unexplained.log_odds < 8
+
+
+def test_a_bias_that_only_completes_a_warm_up_is_not_in_the_twin():
+    """Chips that start warm: a bias less a warm-up, of which no other recording has the warm-up."""
+
+    def warm(t, spin, readings, reference):
+        readings[:, [1, 7]] += np.outer(np.exp(-t / 5.0), [0.1, -0.15])
+
+    found = diagnose([recorded(4, warm)], WHOLE)
+    assert {cause.effect for cause in found.causes} == {"bias", "warm_up"}
+    assert not found.twin.effects
+    assert any("bias is not all in the extended twin" in sentence for sentence in found.sentences)
