@@ -19,8 +19,8 @@ from gfimu.diagnosis.verdict.library import (
 POLICY, RULE = Policy(), LibraryRule()
 
 
-def probability(stds=100.0, **evidence):
-    return library_probability(LibraryEvidence(**evidence), stds, RULE, POLICY)
+def probability(stds=100.0, explained=100.0, **evidence):
+    return library_probability(LibraryEvidence(**evidence), stds, explained, RULE, POLICY)
 
 
 def test_a_large_cause_beside_which_nothing_stays_is_believed():
@@ -32,11 +32,18 @@ def test_each_kind_of_doubt_lowers_it(doubt):
     assert probability(**doubt) < 0.9 * probability()
 
 
+def test_what_stays_counts_beside_what_the_cause_explains():
+    """A tone that a board hums does not make its turn-on bias doubtful, nor what leaves as much as it explains sure."""
+    assert probability(explained=1e5, unexplained=300.0) > 0.9
+    assert probability(explained=300.0, unexplained=300.0) < 0.7
+    assert probability(explained=100.0, unexplained=300.0) < probability(explained=300.0, unexplained=300.0)
+
+
 def test_only_another_recording_makes_it_surer_than_the_rule():
     assert probability() <= RULE.most
     certain = replace(RULE, constant=20.0)
-    assert library_probability(LibraryEvidence(), 100.0, certain, POLICY) == RULE.most
-    assert library_probability(LibraryEvidence(confirmed=True), 100.0, certain, POLICY) == POLICY.most_certain
+    assert library_probability(LibraryEvidence(), 100.0, 300.0, certain, POLICY) == RULE.most
+    assert library_probability(LibraryEvidence(confirmed=True), 100.0, 300.0, certain, POLICY) == POLICY.most_certain
 
 
 def test_shapes_and_angles_do_not_stand_out():
@@ -56,7 +63,7 @@ def test_a_verdict_has_the_product_and_says_so():
     (before,), (after,) = found.causes, doubted.causes
     assert after.probability == pytest.approx(before.probability * doubted.library_probability)
     assert doubted.library_probability == pytest.approx(
-        library_probability(LibraryEvidence(unexplained=3.0), standing_out(before, ()), RULE, POLICY)
+        library_probability(LibraryEvidence(unexplained=3.0), standing_out(before, ()), before.log_odds, RULE, POLICY)
     )
     assert "confounded with nothing outside the library" in doubted.sentences[-1]
     assert "--held-out" in doubted.sentences[-1]
