@@ -143,7 +143,7 @@ _OF_PLACE = {
 }
 
 
-_STEPPED = ("reads", "leans", "moves", "gain")
+_STEPPED = ("reads", "late", "leans", "moves", "gain")
 """Places of the rig where something may slip or jump."""
 
 _OF_BODY = {
