@@ -71,12 +71,20 @@ class Steps:
         stretches, progress = stretches_of(self._model, self._prepared), self._report
         return understand_any_length(stretches, self._policy, lambda share, text: progress(0.05 + 0.6 * share, text))
 
-    def challenged(self, understanding: Understanding) -> Understanding:
-        """Return the same with located terms beside the causes of the library and instead of them."""
+    def challenged(self, understanding: Understanding, start: float = 0.65, end: float = 0.88) -> Understanding:
+        """Return the same with located terms beside the causes of the library and instead of them.
+
+        ``start`` and ``end`` are the shares of the whole diagnosis that are done before and after.
+        """
         self.stage = STAGES[2]
-        self._report(0.65, self.stage)
+        progress = self._report
+        progress(start, self.stage)
+
+        def report(share: float, text: str) -> None:
+            progress(start + (end - start) * share, text)
+
         try:
-            return replace(understanding, explanation=challenged(understanding.explanation, self._policy))
+            return replace(understanding, explanation=challenged(understanding.explanation, self._policy, report))
         except np.linalg.LinAlgError:  # without a solution there is nothing to compare
             return understanding
 
@@ -95,7 +103,7 @@ class Steps:
                 understanding, withdrawn = self._gated(understanding)
                 if before - understanding.explanation.best.log_posterior > LOCATED.free_odds:
                     # What explained so much is real, but it is not what its name says.
-                    understanding, again = self._gated(self.challenged(understanding))
+                    understanding, again = self._gated(self.challenged(understanding, 0.92, 0.95))
                     withdrawn, self.stage = [*withdrawn, *again], STAGES[3]
                 left = self._left(understanding.explanation) if withdrawn else left
                 progress(0.97, "measure the gain")

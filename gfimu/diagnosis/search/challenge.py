@@ -17,7 +17,7 @@ from gfimu.diagnosis.fit.gauss_newton import FEW, Fit, fit
 from gfimu.diagnosis.fit.learn import learn_noise, learn_roughness
 from gfimu.diagnosis.fit.linear import Point, with_residue
 from gfimu.diagnosis.policy import Policy
-from gfimu.diagnosis.search.explain import Explanation, explained
+from gfimu.diagnosis.search.explain import Explanation, Report, explained, leading_words
 from gfimu.diagnosis.search.located_screen import Leader, LocatedScreen
 from gfimu.diagnosis.search.long_run import spread_over_runs
 from gfimu.diagnosis.search.sets import Key, Sets, prune
@@ -43,7 +43,7 @@ class Challenged:
     rivals: tuple[Fit, ...]
 
 
-def challenged(explanation: Explanation, policy: Policy) -> Explanation:
+def challenged(explanation: Explanation, policy: Policy, report: Report = lambda share, text: None) -> Explanation:
     """Return an explanation with located terms beside its named causes, or instead of them, where these win.
 
     Terms are searched in some stretches, up to so many samples of each, and fitted to all.
@@ -54,6 +54,8 @@ def challenged(explanation: Explanation, policy: Policy) -> Explanation:
         What the search of the library ended with.
     policy : Policy
         Thresholds of `challenge`.
+    report : callable
+        Called with the share done and a line of text.
 
     Raises
     ------
@@ -65,7 +67,7 @@ def challenged(explanation: Explanation, policy: Policy) -> Explanation:
     some = [stretches[place] for place in chosen]
     if not isinstance(some[0], BodyStretch):
         some = [replace(one, run=one.run.rows(0, min(len(one.run.t), LOCATED.samples))) for one in some]
-    found = challenge(some, _of_part(some, chosen, best.point), policy)
+    found = challenge(some, _of_part(some, chosen, best.point), policy, report)
     if not any(map(is_located, found.best.causes)):
         others = [
             replace(one, log_posterior=best.log_posterior + _gains(one, found.best))
@@ -99,7 +101,9 @@ def _of_part(stretches: Sequence[Stretch], chosen: Sequence[int], point: Point) 
     return part if point.residue is None else with_residue(stretches, part, point.residue.scale)
 
 
-def challenge(stretches: Sequence[Stretch], point: Point, policy: Policy) -> Challenged:
+def challenge(
+    stretches: Sequence[Stretch], point: Point, policy: Policy, report: Report = lambda share, text: None
+) -> Challenged:
     """Compare a set of causes with located terms beside it and instead of its members.
 
     Parameters
@@ -110,12 +114,15 @@ def challenge(stretches: Sequence[Stretch], point: Point, policy: Policy) -> Cha
         The set at its optimum, with the noise that it leaves.
     policy : Policy
         Thresholds ``cause_odds``, ``extra_odds``, ``close``, ``inexactness`` and ``worth_a_search``.
+    report : callable
+        Called with the share done and what leads.
     """
     best, nothing = (fit(stretches, replace(point, causes=some), policy) for some in (point.causes, ()))
     leading = max(best, _settled(stretches, best, policy), key=lambda one: one.log_posterior)
     settled = {best.key: leading}
     is_body = isinstance(stretches[0], BodyStretch)
-    for _ in range(LOCATED.terms):
+    for round_ in range(LOCATED.terms):
+        report(round_ / LOCATED.terms, leading_words("places", leading))
         if is_body:  # the evidence is that of one misfit of the noise, and compares with no other
             settled = {leading.key: leading}
         fewer = _fewer(stretches, leading, policy)

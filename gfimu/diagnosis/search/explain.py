@@ -18,11 +18,11 @@ from gfimu.diagnosis.search.screening import Screening, screen
 from gfimu.diagnosis.search.sets import Key, Sets, has_stalled, prune
 from gfimu.diagnosis.terms.cause import Cause, effects_of
 from gfimu.diagnosis.terms.drive import Drive
-from gfimu.diagnosis.terms.located.term import is_located
+from gfimu.diagnosis.terms.located.term import LocatedTerm, is_located
 from gfimu.diagnosis.time_limit import what_ended
 from gfimu.model.world_model import memory_of
 
-__all__ = ["Explanation", "exactly", "explain", "explained", "reduced"]
+__all__ = ["Explanation", "Report", "exactly", "explain", "explained", "leading_words", "reduced"]
 
 Report = Callable[[float, str], None]
 
@@ -130,7 +130,7 @@ def _searched(sets: Sets, progress: Report) -> Explanation:
     policy, fits, seen, last = sets.policy, 0, set[Key](), None
     try:
         for index in range(policy.rounds):
-            progress(index / policy.rounds, _leading(sets.best))
+            progress(index / policy.rounds, leading_words("search", sets.best))
             before = sets.best
             last = (before.key, screen(sets.stretches, before.point))
             _fit_leaders(sets, last[1], before, near=index > 0)
@@ -159,9 +159,10 @@ def _searched(sets: Sets, progress: Report) -> Explanation:
     return explained(sets, best, fits + sets.count, last[1] if last is not None and best.key == last[0] else None)
 
 
-def _leading(best: Fit) -> str:
-    """Return what a search says of itself: the most probable set so far."""
-    return f"search; leading: {' + '.join(sorted(best.names))}" if best.causes else "search"
+def leading_words(stage: str, best: Fit) -> str:
+    """Return what a stage of a search says of itself: the most probable set so far."""
+    names = [one.family.where.words if isinstance(one.family, LocatedTerm) else one.name for one in best.causes]
+    return f"{stage}; leading: {' + '.join(sorted(names))}" if names else stage
 
 
 def _relearned(stretches: Sequence[Stretch], best: Fit, policy: Policy, *, sharpen: bool) -> Point:

@@ -41,6 +41,7 @@ def interrupting(text, *words):
         ("drive", "search", False),
         ("leading", "search", True),
         ("places", "places", True),
+        ("places; leading: table_tilt", "places", True),
         ("hold out", "validation", True),
     ],
 )
