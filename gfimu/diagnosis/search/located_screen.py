@@ -204,9 +204,8 @@ class LocatedScreen:
             return []
         prior = self._log_prior(term)
         best: tuple[float, int, _Floats] | None = None
-        for length in range(len(term.dependence.roots)):
-            mixing = term.mixing(length)
-            inner, right = mixing.T @ gram @ mixing, mixing.T @ score
+        for length, root in enumerate(term.dependence.roots):
+            inner, right = _mixed(gram, score, root)
             value = log_evidence(0.5 * (inner + inner.T), right) + prior
             if np.isfinite(value) and value >= least and (best is None or value > best[0]):
                 best = value, length, np.asarray(np.linalg.solve(inner + np.eye(len(right)), right))
@@ -215,3 +214,11 @@ class LocatedScreen:
     def _log_prior(self, term: LocatedTerm) -> float:
         alike = {"one": self._array.n_channels, "chip": len(self._array.chips)}.get(term.pattern, 1)
         return LOCATED.log_prior - term.dependence.looks - float(np.log(alike))
+
+
+def _mixed(gram: _Floats, score: _Floats, root: _Floats) -> tuple[_Floats, _Floats]:
+    """Return G and b of coordinates whose mixing is the same root (K, k) for each component of a term."""
+    count, (functions, unknowns) = len(score) // len(root), root.shape
+    half = (gram.reshape(-1, count, functions) @ root).reshape(count * functions, -1)
+    inner = (half.T.reshape(-1, count, functions) @ root).reshape(count * unknowns, -1)
+    return inner.T, (score.reshape(count, functions) @ root).ravel()
