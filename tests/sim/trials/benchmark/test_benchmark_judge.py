@@ -138,6 +138,7 @@ def test_every_listed_effect_has_a_place_and_every_dependence_its_quantities():
         "order 7.3 |omega|": {"theta", "omega"},
         "mode at 6.2 Hz of alpha": {"alpha"},
         "tone at 23.7 Hz": {"t"},
+        "step at 12.13 s": {"t"},
         "memory of alpha": {"alpha"},
         "y^3": {"y"},
         "1": {"1"},
