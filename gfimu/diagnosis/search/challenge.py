@@ -118,13 +118,13 @@ def challenge(
         Called with the share done and what leads.
     """
     best, nothing = (fit(stretches, replace(point, causes=some), policy) for some in (point.causes, ()))
-    leading = max(best, _settled(stretches, best, policy), key=lambda one: one.log_posterior)
-    settled = {best.key: leading}
     is_body = isinstance(stretches[0], BodyStretch)
+    leading = best if is_body else max(best, _settled(stretches, best, policy), key=lambda one: one.log_posterior)
+    settled = {best.key: leading}
     for round_ in range(LOCATED.terms):
         report(round_ / LOCATED.terms, leading_words("places", leading))
         if is_body:  # the evidence is that of one misfit of the noise, and compares with no other
-            settled = {leading.key: leading}
+            settled, nothing = {leading.key: leading}, fit(stretches, replace(leading.point, causes=()), policy)
         fewer = _fewer(stretches, leading, policy)
         needed = _needed(leading, fewer, nothing, policy)
         tried = _tried(stretches, leading, fewer, needed, policy)

@@ -133,6 +133,6 @@ GOES_WITH: dict[str, tuple[str, ...]] = {
 
 def quantities_of(dependence: str) -> frozenset[str]:
     """Return the quantities that a dependence of ``verdict.json`` is of, such as omega of f(omega) or of omega^3."""
-    words = {"revolution": "theta", "order": "theta", "tone": "t", "time": "t", "step": "t", "unbalance": "theta", "y": "y"}
+    words = dict.fromkeys(("tone", "time", "step"), "t") | dict.fromkeys(("revolution", "order", "unbalance"), "theta")
     found = re.findall(r"[A-Za-z]+|^1$", dependence.replace("dT/dt", "T"))
     return frozenset(words.get(word, word) for word in found) & {"1", "omega", "alpha", "theta", "t", "T", "y"}
