@@ -20,7 +20,6 @@ DRAWING = {
     "matplotlib": {
         "gfimu/array_search/pictures.py",
         "gfimu/calibration/pictures.py",
-        "gfimu/diagnosis/report/channel_tables.py",
         "gfimu/diagnosis/report/figures.py",
         "gfimu/budget/tolerances/picture.py",
         "gfimu/visual/page/svg.py",

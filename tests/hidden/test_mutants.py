@@ -76,7 +76,7 @@ def residuals_unjudged(patch):
     """Whatever is left, the best set of names is believed; only the gate may withdraw it."""
     patch.setattr(ENGINE, "is_unknown", lambda *_: False)
     patch.setattr(ENGINE, "is_dominant", lambda *_: False)
-    patch.setattr(ENGINE, "challenged", lambda explanation, _: explanation)
+    patch.setattr(ENGINE, "challenged", lambda explanation, *_: explanation)
     kept = ENGINE.Steps
     patch.setattr(kept, "_apart_from_the_rest", lambda self, found: (found, self._left(found.explanation)))
 
