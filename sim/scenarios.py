@@ -199,7 +199,7 @@ def _refuse_table_keys(scenario: Scenario, source: str) -> None:
             try:
                 LocatedEffect.of_parameters(effect.parameters, scenario.array).added(still)
             except InputError as error:
-                raise InputError(f"{source}: effect {UNLISTED}: {error}; leave it out") from None
+                raise InputError(f"{source}: {error}") from None
     if any(getattr(world, name) != getattr(nominal, name) for name in same) or any(
         not np.array_equal(getattr(world, name), getattr(nominal, name)) for name in moved
     ):

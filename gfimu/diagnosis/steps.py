@@ -77,11 +77,10 @@ class Steps:
         ``start`` and ``end`` are the shares of the whole diagnosis that are done before and after.
         """
         self.stage = STAGES[2]
-        progress = self._report
-        progress(start, self.stage)
+        self._report(start, self.stage)
 
         def report(share: float, text: str) -> None:
-            progress(start + (end - start) * share, text)
+            self._report(start + (end - start) * share, text)
 
         try:
             return replace(understanding, explanation=challenged(understanding.explanation, self._policy, report))

@@ -93,13 +93,8 @@ class _AtPlace:
         return np.asarray(reading + self._added(empty, context)[:, -1])
 
     def _added(self, readings: NDArray[np.float64], context: SampleContext) -> NDArray[np.float64]:
-        t = context.t
+        t, warm = self._world.since_start(context.t), context.temperature
         if context.body is not None:
-            since = self._world.since_start(t)
-            array = self._world.array
-            state = RigState.of_body(array, context.body, since, readings, context.temperature)
-            return self._effect.added(state)
+            return self._effect.added(RigState.of_body(self._world.array, context.body, t, readings, warm))
         period = float(np.median(np.diff(t))) if len(t) > 1 else 1.0
-        since = self._world.since_start(t)
-        state = RigState(since, context.spin, readings, context.temperature, period, self._placed)
-        return self._effect.added(state)
+        return self._effect.added(RigState(t, context.spin, readings, warm, period, self._placed))

@@ -93,20 +93,24 @@ class DrawnRig:
         return np.asarray(Rotation.from_rotvec(self.lean).apply(about.apply(centre)) + lift)
 
 
+_OF_AXIS = {"geometry", "motion", "reference", "timing", "clock", "bench"}
+"""Places of effects and of errors without a name that are the rig's, and not the array's."""
+
+
 def marked_of(diagnosis: Diagnosis) -> Marked:
     """Return where the causes of a diagnosis are: their chips, or the package, or the axis with what turns about it."""
     array, families = diagnosis.twin.array, diagnosis.twin.families()
     chips, kinds = set[int](), set[str]()
     for cause in diagnosis.causes:
-        own = _chips(cause, array)
-        chips |= own
-        if cause.unlisted is not None:
-            kinds |= set() if own else {cause.unlisted.place}
-        elif not own and cause.effect in families:
-            kinds |= {families[cause.effect].place}
+        if own := _chips(cause, array):
+            chips |= own
+        elif cause.unlisted is not None:
+            kinds.add(cause.unlisted.place)
+        elif cause.effect in families:
+            kinds.add(families[cause.effect].place)
     if kinds & {"sensing", "supply"}:
         chips |= set(range(len(array.chips)))
-    return Marked(frozenset(chips), bool(kinds & {"geometry", "array"}), bool(kinds - {"sensing", "supply", "array"}))
+    return Marked(frozenset(chips), bool(kinds & {"geometry", "array"}), bool(kinds & _OF_AXIS))
 
 
 def _chips(cause: NamedCause, array: AccelerometerArray) -> set[int]:

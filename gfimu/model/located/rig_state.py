@@ -18,8 +18,8 @@ from gfimu.motion.body_drive import BodyDrive
 __all__ = ["AddedEffect", "RigState", "split"]
 
 
-_NO_BODY = "an error of a free body, which a rig with an axis is not"
-_NO_TABLE = "an error of the table or of its angle, which the rig has not"
+_NO_BODY = "effect 'unlisted': it is an error of a free body, and this rig has an axis; leave the effect out"
+_NO_TABLE = "effect 'unlisted': it is an error of a table or of its angle, and this rig has none; leave the effect out"
 
 
 @dataclass(frozen=True)

@@ -39,7 +39,7 @@ def gyro_by_force(recording):
     ("change", "place", "series", "dependence"),
     [
         (offset_by_speed, "channel", ("a22",), "omega^2"),
-        pytest.param(gain_in_time, "chip", ("a3",), "t", marks=pytest.mark.study),
+        (gain_in_time, "chip", ("a3",), "t"),
         (gyro_by_force, "reference", ("x", "y", "z"), "force change"),
     ],
 )

@@ -99,7 +99,7 @@ def test_a_table_has_no_gyro_and_a_body_no_axis():
     leaning = LocatedEffect(
         rig_places(is_angle=False)["leans"], dependence_of("omega^2", {"scale": 1.0, "first": 0.0}), "all", np.ones(2)
     )
-    with pytest.raises(InputError, match="an error of the table"):
+    with pytest.raises(InputError, match="an error of a table"):
         leaning.added(STATE)
     of_angle = LocatedEffect(
         channel_place("channel", "offset", ((0,),), ["a11"]),

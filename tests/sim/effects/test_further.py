@@ -127,5 +127,5 @@ def test_a_tumbling_body_has_no_table_whose_error_it_could_be(tmp_path, place, w
     if there:
         assert [effect.name for effect in Scenario.load(path).effects] == ["unlisted"]
         return
-    with pytest.raises(InputError, match=r"unlisted: an error of the table or of its angle"):
+    with pytest.raises(InputError, match=r".unlisted.: it is an error of a table or of its angle"):
         Scenario.load(path)

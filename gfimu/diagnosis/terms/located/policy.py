@@ -20,7 +20,8 @@ class LocatedPolicy:
         Log prior of a function at a place, as one of the many that have no name [nats]. Set in a prototype, where it
         separated right names from descriptions of the same worlds.
     free_odds : float
-        Log odds that an error that is free in time needs [nats]. Set on runs with nothing hidden, which reached 23.
+        Log odds that an error that is free in time needs [nats]. Set on runs with nothing hidden, which reached 23. A
+        cause that held-out data refute is searched for anew where it explained more than this.
     most_certain_place : float
         Largest probability of a place that is reported [1]. Set by 24 worlds outside the library: of 22 places that
         were far ahead of others by the evidence, 19 were right.

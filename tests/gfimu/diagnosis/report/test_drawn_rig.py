@@ -13,7 +13,10 @@ from gfimu.commands.diagnose import drawn_rig
 from gfimu.diagnosis import DrawnRig
 from gfimu.diagnosis.report.picture import _motion, _notes
 from gfimu.diagnosis.report.plain_words import parameter_units
+from gfimu.diagnosis.report.rig import marked_of, marked_words
 from sim.twin import Twin
+
+FOUND = made_diagnosis("explained")
 
 
 @pytest.fixture(scope="module")
@@ -64,3 +67,33 @@ def test_the_picture_prints_a_parameter_in_the_unit_that_its_effect_declares():
     assert units[key] == "m/s²/(rad/s)⁴"
     assert "a11 (5.80 ± 0.20)·10⁻⁶ m/s²/(rad/s)⁴ (probability" in _notes(replace(found, causes=(cause,)))
     assert parameter_units(found, replace(cause, effect="not in the library")) == {}
+
+
+@pytest.mark.parametrize(
+    ("cause", "words"),
+    [
+        (
+            NamedCause("bias", {"a21_m_s2": 0.1, "a31_m_s2": 0.001}, {"a21_m_s2": 0.01, "a31_m_s2": 0.01}, 0.9),
+            "chip a2",
+        ),
+        (NamedCause("gain_drift", {"ratio": 0.1}, {"ratio": 0.01}, 0.9), "every chip"),
+        (
+            NamedCause("table_tilt", {"x_rad": 0.1}, {"x_rad": 0.01}, 0.9),
+            "the array as a whole; the axis, with the table and its reference",
+        ),
+        (
+            NamedCause("tacho_scale", {"ratio": 0.1}, {"ratio": 0.01}, 0.9),
+            "the axis, with the table and its reference",
+        ),
+        (NamedCause("dropped_frames", {}, {}, 0.9), "nowhere in the array"),
+    ],
+)
+def test_a_cause_is_marked_where_it_is(cause, words):
+    marked = marked_of(replace(FOUND, causes=(cause,)))
+    assert marked_words(marked, FOUND.twin.array, has_axis=True) == words
+
+
+def test_a_described_error_of_the_reference_is_at_the_axis_and_a_gyro_is_not_drawn():
+    marked = marked_of(made_diagnosis("unknown"))
+    assert (marked.chips, marked.package, marked.axis) == (frozenset(), False, True)
+    assert marked_words(marked, FOUND.twin.array, has_axis=False) == "the gyro, which is not drawn"

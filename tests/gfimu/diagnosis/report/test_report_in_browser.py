@@ -271,9 +271,9 @@ def test_tables_of_channels_and_sizes_are_whole_on_a_telephone(page):
 def test_ticks_of_a_spectrum_are_round_numbers(browser, tmp_path):
     diagnosis = made_diagnosis("explained")
     (run,) = diagnosis.runs
-    ringing = run.measured + 0.2 * np.sin(2 * np.pi * 11.3 * run.t)[:, None]
-    file = tmp_path / "ringing.html"
-    file.write_text(report_html(replace(diagnosis, runs=(replace(run, measured=ringing),))), encoding="utf-8")
+    with_tone = run.measured + 0.2 * np.sin(2 * np.pi * 11.3 * run.t)[:, None]
+    file = tmp_path / "tone.html"
+    file.write_text(report_html(replace(diagnosis, runs=(replace(run, measured=with_tone),))), encoding="utf-8")
     browser.open(file)
     browser.wait(READY)
     browser.settle()
