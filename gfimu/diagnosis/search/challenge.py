@@ -189,15 +189,19 @@ def _tried(
     for _, leader, base in promised[: LOCATED.fitted]:
         cause = screen.refined(leader, leading.key - base.key).cause
         tried = _fitted(stretches, replace(base.point, causes=(*base.causes, cause)), policy)
-        fitted += [one for one in tried if base is leading or _says_more(one, leading, policy)]
+        fitted += [one for one in tried if base is leading or _says_more(one, leading, base, policy)]
     fitted.sort(key=lambda one: -one.log_posterior)
     return fitted[: LOCATED.compared]
 
 
-def _says_more(one: Fit, leading: Fit, policy: Policy) -> bool:
-    """Whether a set fits better than a leading one or needs fewer numbers; otherwise it is the same without a name."""
+def _says_more(one: Fit, leading: Fit, base: Fit, policy: Policy) -> bool:
+    """Whether a set needs fewer numbers than a leading one, or fits better; otherwise it is the same without a name.
+
+    It fits better by more than what the inexactness of the causes leaves that it replaces, those not in ``base``.
+    """
     count, most = (sum(len(cause.coordinates) for cause in fit.causes) for fit in (one, leading))
-    return count < most or one.objective < leading.objective - 2.0 * policy.cause_odds
+    inexact = policy.inexactness * (base.objective - leading.objective)
+    return count < most or leading.objective - one.objective > 2.0 * max(policy.cause_odds, inexact)
 
 
 def _fitted(stretches: Sequence[Stretch], point: Point, policy: Policy) -> list[Fit]:
