@@ -19,10 +19,11 @@ from gfimu.diagnosis.data.run import Run, smooth_rate
 from gfimu.diagnosis.data.table.spins import JoinedSpin, ScaledSpin, State
 from gfimu.diagnosis.data.table.start_angle import gravity_angle
 from gfimu.diagnosis.time_limit import check_time
+from gfimu.model.located.operators import moved
 from gfimu.model.located.rig_state import RigState, split
 from gfimu.model.world_model import Effect, Spin, WorldModel, is_linear, is_of_wiring, reads_place
 
-__all__ = ["NoPredictionError", "RunUp", "Stretch", "finite_prediction", "make_stretches", "moved"]
+__all__ = ["NoPredictionError", "RunUp", "Stretch", "finite_prediction", "make_stretches"]
 
 _DURATION = 64.0  # s, about: one drive's normal equations grow with its square
 _LOST_ANGLE_STD = 3.0  # rad: the table's angle after a gap of the reference
@@ -353,26 +354,6 @@ def _coarse_step(model: WorldModel, run: Run, faults: Sequence[Effect]) -> float
     found = [float(fault.parameters["step_m_s2"]) for fault in faults if fault.name == "coarse_resolution"]
     quantum = found[-1] if found else expected.quantum
     return quantum if quantum > COARSE * float(np.median(expected.analogue)) else 0.0
-
-
-def moved(values: NDArray[np.float64], share: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return smooth values (n, …) moved by shares of a sample (n, …), by the cubic through the four nearest.
-
-    Lagrange's form (Abramowitz and Stegun, 25.2.13); at the ends the cubic through the outermost four.
-    """
-    if len(values) < 4:
-        return values
-    at = np.arange(len(values)).reshape(-1, *[1] * (values.ndim - 1)) + share
-    first = np.clip(np.floor(at).astype(int) - 1, 0, len(values) - 4)
-    u = at - first
-    weights = (
-        -(u - 1.0) * (u - 2.0) * (u - 3.0) / 6.0,
-        u * (u - 2.0) * (u - 3.0) / 2.0,
-        -u * (u - 1.0) * (u - 3.0) / 2.0,
-        u * (u - 1.0) * (u - 2.0) / 6.0,
-    )
-    near = (np.take_along_axis(values, first + index, axis=0) for index in range(len(weights)))
-    return np.asarray(sum(weight * one for weight, one in zip(weights, near, strict=True)))
 
 
 def _known_walk(model: WorldModel) -> float:

@@ -28,12 +28,21 @@ class Rows:
     starts: NDArray[np.intp]
     sizes: NDArray[np.intp]
 
-    def averaged(self, values: _Floats) -> _Floats:
-        """Return rows (n, …) averaged in each group, times the root of its size."""
+    def means(self, values: _Floats) -> _Floats:
+        """Return the mean of the rows (n, …) of each group."""
         if not len(self.starts):
             return values
         sums = np.add.reduceat(values, self.starts, axis=0)
-        return np.asarray(sums / np.sqrt(self.sizes).reshape(-1, *[1] * (values.ndim - 1)))
+        return np.asarray(sums / self.sizes.reshape(-1, *[1] * (values.ndim - 1)))
+
+    def averaged(self, values: _Floats) -> _Floats:
+        """Return rows (n, …) averaged in each group, times the root of its size."""
+        return self.means(values) * self.roots.reshape(-1, *[1] * (values.ndim - 1))
+
+    @property
+    def roots(self) -> _Floats:
+        """Root of the number of rows of each group, (m,); one where rows stay as they are."""
+        return np.sqrt(self.sizes) if len(self.sizes) else np.ones(1)
 
     def of_columns(self, columns: Columns) -> Columns:
         """Return columns on the averaged rows."""
@@ -82,7 +91,7 @@ def coarse(posterior: Posterior, most: int) -> tuple[Posterior, Rows]:
     short = replace(
         seen,
         residual=rows.averaged(seen.residual),
-        weight=rows.averaged(seen.weight) / np.sqrt(rows.sizes)[:, None],
+        weight=rows.means(seen.weight),
         modes=_AveragedModes(seen.modes, rows),
     )
     return posterior_of(short, replace(jacobian, blocks=tuple(blocks)), posterior.drive), rows

@@ -161,10 +161,9 @@ def _gains(one: Fit, other: Fit) -> float:
 
 
 def _fewer(stretches: Sequence[Stretch], found: Fit, policy: Policy) -> list[Fit]:
-    """Return a set without each of its named causes, and without all of these, under its noise."""
-    named = [cause for cause in found.causes if not is_located(cause)]
-    sets = [tuple(other for other in found.causes if other is not cause) for cause in named]
-    if len(named) > 1:
+    """Return a set without each of its causes, and without all that are named, under its noise."""
+    sets = [tuple(other for other in found.causes if other is not cause) for cause in found.causes]
+    if sum(not is_located(cause) for cause in found.causes) > 1:
         sets.append(tuple(filter(is_located, found.causes)))
     few = replace(policy, steps=FEW)
     return [fit(stretches, replace(found.point, causes=causes), few) for causes in sets]
@@ -183,7 +182,8 @@ def _tried(
     for base, leaders in zip((leading, *fewer), screen.leaders_each(cases), strict=True):
         shaped = [screen.refined(one, leading.key - base.key) for one in _first_of_each_shape(leaders)]
         ranked = sorted([*shaped, *leaders], key=lambda one: -one.log_odds)
-        promised += [(base.log_posterior + leader.log_odds, leader, base) for leader in _distinct(ranked)]
+        others = [one for one in _distinct(ranked) if one.cause.key not in leading.key]
+        promised += [(base.log_posterior + leader.log_odds, leader, base) for leader in others]
     promised.sort(key=lambda one: -one[0])
     fitted: list[Fit] = []
     for _, leader, base in promised[: LOCATED.fitted]:
@@ -195,13 +195,16 @@ def _tried(
 
 
 def _says_more(one: Fit, leading: Fit, base: Fit, policy: Policy) -> bool:
-    """Whether a set needs fewer numbers than a leading one, or fits better; otherwise it is the same without a name.
+    """Whether a set has fewer causes or numbers than a leading one, or fits better; else it is the same without a name.
 
-    It fits better by more than what the inexactness of the causes leaves that it replaces, those not in ``base``.
+    It fits better by more than what the inexactness of the named causes leaves that it replaces, those not in ``base``.
     """
+    if all(is_located(cause) for cause in leading.causes if cause.key not in base.key):
+        return True
     count, most = (sum(len(cause.coordinates) for cause in fit.causes) for fit in (one, leading))
     inexact = policy.inexactness * (base.objective - leading.objective)
-    return count < most or leading.objective - one.objective > 2.0 * max(policy.cause_odds, inexact)
+    simpler = count < most or len(one.causes) < len(leading.causes)
+    return simpler or leading.objective - one.objective > 2.0 * max(policy.cause_odds, inexact)
 
 
 def _fitted(stretches: Sequence[Stretch], point: Point, policy: Policy) -> list[Fit]:

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.diagnosis.data.body.stretch import BodyStretch
 from gfimu.diagnosis.data.stretch import Stretch
-from gfimu.diagnosis.fit.coarse import WHOLE, coarse
+from gfimu.diagnosis.fit.coarse import Rows, coarse
 from gfimu.diagnosis.fit.evidence import inverse, log_evidence
 from gfimu.diagnosis.fit.gauss_newton import precision
 from gfimu.diagnosis.fit.linear import Point, linearise
+from gfimu.diagnosis.fit.posterior import Posterior
 from gfimu.diagnosis.search.sets import Key
 from gfimu.diagnosis.search.waves import wave_terms
 from gfimu.diagnosis.terms.cause import Cause, effects_of
@@ -28,7 +30,7 @@ from gfimu.diagnosis.terms.located.alternatives import (
     rig_terms,
 )
 from gfimu.diagnosis.terms.located.policy import LOCATED
-from gfimu.diagnosis.terms.located.term import LocatedTerm, located_columns
+from gfimu.diagnosis.terms.located.term import LocatedTerm, Shown, located_columns
 from gfimu.model.located.operators import channel_place
 from gfimu.model.world_model import reads_place
 
@@ -54,6 +56,21 @@ class Leader:
     log_odds: float
     term: LocatedTerm
     cause: Cause
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """A stretch on averages of some rows: its posterior, its rows, what shows in them, and the present columns."""
+
+    posterior: Posterior
+    rows: Rows
+    shown: Shown
+    present: Columns
+
+    @cached_property
+    def weight(self) -> _Floats:
+        """What columns of means are multiplied by, (m, c + 1)."""
+        return self.rows.roots[:, None] * self.posterior.observed.weight
 
 
 class LocatedScreen:
@@ -82,9 +99,9 @@ class LocatedScreen:
         self._unknowns = {
             cause.key: np.arange(start, stop) for cause, start, stop in zip(point.causes, ends, ends[1:], strict=False)
         }
-        most = max(int(1.0 / (LOCATED.averaged_hz * stretches[0].run.sample_period)), 1)
         self._is_body = isinstance(stretches[0], BodyStretch)
-        self._coarse = [(one, WHOLE) if self._is_body else coarse(one, most) for one in self._posteriors]
+        self._fastest = max(float(np.abs(state.spin.rate).max()) for state in self._states)
+        self._seen: dict[int, list[_Seen]] = {}
         self._sizes = np.zeros(len(self._precision))
         for cause in point.causes:
             self._sizes[self._unknowns[cause.key][: len(cause.coordinates)]] = cause.coordinates
@@ -137,31 +154,41 @@ class LocatedScreen:
 
     def _each(self, terms: Iterable[LocatedTerm]) -> Iterator[tuple[LocatedTerm, _Floats, _Floats]]:
         """Yield terms that are not too wide with the products of the causes' unknowns and their coefficients."""
-        slow: list[LocatedTerm] = []
-        fast: list[LocatedTerm] = []
+        waiting: dict[int, list[LocatedTerm]] = {}
         for term in terms:
             if term.count <= LOCATED.widest:
-                some = slow if term.dependence.is_slow else fast
+                most = self._most(term)
+                some = waiting.setdefault(most, [])
                 if some and sum(one.count for one in some) + term.count > LOCATED.together:
-                    yield from self._products(some)
+                    yield from self._products(some, most)
                     some.clear()
                 some.append(term)
-        for some in (slow, fast):
-            if some:
-                yield from self._products(some)
+        for most, some in waiting.items():
+            yield from self._products(some, most)
 
-    def _products(self, terms: Sequence[LocatedTerm]) -> Iterator[tuple[LocatedTerm, _Floats, _Floats]]:
+    def _most(self, term: LocatedTerm) -> int:
+        """Return how many rows may be averaged to see a term: a power of two; one of a body's, which are averages."""
+        needed = max(LOCATED.averaged_hz, LOCATED.oversampled * term.dependence.highest_hz(self._fastest))
+        whole = 1 if self._is_body else max(int(1.0 / (needed * self._stretches[0].run.sample_period)), 1)
+        return int(2 ** (whole.bit_length() - 1))
+
+    def _averaged(self, most: int) -> list[_Seen]:
+        """Return the stretches on averages of so many rows."""
+        if most not in self._seen:
+            self._seen[most] = []
+            for state, posterior, present in zip(self._states, self._posteriors, self._present, strict=True):
+                short, rows = coarse(posterior, most)
+                self._seen[most].append(_Seen(short, rows, Shown(state, rows.means), rows.of_columns(present)))
+        return self._seen[most]
+
+    def _products(self, terms: Sequence[LocatedTerm], most: int) -> Iterator[tuple[LocatedTerm, _Floats, _Floats]]:
         """Yield terms with G (P, P) and b (P,) of the causes' unknowns and their coefficients, relative to no sizes."""
         held = len(self._sizes)
         count = held + sum(term.count for term in terms)
         gram, score = np.zeros((count, count)), np.zeros(count)
-        for index, (state, present, whole) in enumerate(
-            zip(self._states, self._present, self._posteriors, strict=True)
-        ):
-            weight, observed = whole.observed.weight, self._stretches[index].observed
-            columns = Columns.together([present, *(located_columns(term, state, weight, observed) for term in terms)])
-            posterior, rows = self._coarse[index] if terms[0].dependence.is_slow else (whole, WHOLE)
-            own, right, _ = posterior.products(rows.of_columns(columns))
+        for stretch, seen in zip(self._stretches, self._averaged(most), strict=True):
+            columns = [located_columns(term, seen.shown, seen.weight, stretch.observed) for term in terms]
+            own, right, _ = seen.posterior.products(Columns.together([seen.present, *columns]))
             gram, score = gram + own, score + right
         score += gram[:, :held] @ self._sizes
         start = held

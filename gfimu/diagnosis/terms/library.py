@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from gfimu.diagnosis.data.stretch import NoPredictionError, Stretch
 from gfimu.diagnosis.terms.cause import Cause, effects_of
 from gfimu.diagnosis.terms.columns import Columns
-from gfimu.diagnosis.terms.located.term import LocatedTerm, located_columns
+from gfimu.diagnosis.terms.located.term import LocatedTerm, Shown, located_columns
 from gfimu.diagnosis.terms.reach import behind_wiring, disjoint
+from gfimu.model.located.effect import LocatedEffect
 from gfimu.model.world_model import Effect, EffectFamily
 
 __all__ = ["Nuisance", "Seen", "cause_columns", "family_columns"]
@@ -78,8 +79,10 @@ def cause_columns(stretch: Stretch, seen: Seen, drive: Nuisance, causes: Sequenc
     found = [Columns.none(len(seen.weights), len(seen.prediction))]
     for number, cause in enumerate(causes):
         if isinstance(cause.family, LocatedTerm):
-            state = stretch.state(present, drive.spin)
-            found.append(located_columns(cause.family, state, seen.weight, stretch.observed).mixed(cause.mixing))
+            state, own = stretch.state(present, drive.spin), present[number]
+            assert isinstance(own, LocatedEffect)
+            columns = located_columns(cause.family, Shown(state), seen.weight, stretch.observed, own)
+            found.append(columns.mixed(cause.mixing))
             continue
         count = len(cause.coordinates)
         step = _step(cause, stretch)

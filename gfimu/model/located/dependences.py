@@ -128,8 +128,7 @@ class Dependence(ABC):
 
     ``name`` identifies it in ``verdict.json``, ``kind`` is the same for all that mean the same to a person, ``words``
     say how an error goes with it, ``looks`` is what it costs to have been chosen among many alike, nats, ``memory_s``
-    how long it remembers the drive, ``of_one_recording`` whether it is of absolute time, and ``is_slow`` whether
-    averages over some hundredths of a second show it as well.
+    how long it remembers the drive, and ``of_one_recording`` whether it is of absolute time.
     """
 
     name: str
@@ -138,7 +137,6 @@ class Dependence(ABC):
     looks: float = 0.0
     memory_s: float = 0.0
     of_one_recording: bool = False
-    is_slow: bool = True
 
     @property
     @abstractmethod
@@ -158,6 +156,11 @@ class Dependence(ABC):
         """Return dependences of another shape nearby, where it has a shape: a frequency, a damping, an order."""
         del width
         return []
+
+    def highest_hz(self, fastest: float) -> float:
+        """Return the highest frequency that it adds to a motion at rates up to ``fastest``, rad/s; zero if none."""
+        del fastest
+        return 0.0
 
     @property
     def count(self) -> int:
@@ -430,7 +433,10 @@ class Revolution(Dependence):
     harmonics: int = USUAL.harmonics
     kind: str = "revolution"
     words: str = "by the angle within a revolution"
-    is_slow = False
+
+    def highest_hz(self, fastest: float) -> float:
+        """Return the highest frequency that it adds to a motion at rates up to ``fastest``, rad/s."""
+        return self.harmonics * fastest / (2.0 * np.pi)
 
     @property
     def numbers(self) -> dict[str, Any]:
@@ -472,7 +478,9 @@ class Wave(Dependence):
     fastest: float = 0.0
     looks: float = USUAL.wave_looks
 
-    is_slow = False
+    def highest_hz(self, fastest: float) -> float:
+        """Return the highest frequency that it adds to a motion at rates up to ``fastest``, rad/s."""
+        return self.cycles if self.of_time else self.cycles * fastest / (2.0 * np.pi)
 
     @property
     def numbers(self) -> dict[str, Any]:
@@ -580,7 +588,10 @@ class Memory(Dependence):
     scale: float
     lags_s: tuple[float, ...] = USUAL.lags_s
 
-    is_slow = False
+    def highest_hz(self, fastest: float) -> float:
+        """Return the highest frequency that its lags tell apart, Hz."""
+        del fastest
+        return 0.5 / min(np.diff(self.lags_s))
 
     @property
     def numbers(self) -> dict[str, Any]:
@@ -673,7 +684,10 @@ class Mode(Dependence):
     damping: float = USUAL.damping
     looks: float = USUAL.mode_looks
 
-    is_slow = False
+    def highest_hz(self, fastest: float) -> float:
+        """Return its own frequency, Hz."""
+        del fastest
+        return self.frequency_hz
 
     @property
     def numbers(self) -> dict[str, Any]:

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from gfimu.array.array import AccelerometerArray
 from gfimu.base.errors import InputError
 from gfimu.model.located.dependences import Dependence, dependence_of
-from gfimu.model.located.operators import Operator, Place, body_places, channel_place, rig_places
+from gfimu.model.located.operators import Place, body_places, channel_place, rig_places
 from gfimu.model.located.rig_state import AddedEffect, RigState
 
-__all__ = ["OF_REFERENCE", "UNLISTED", "LocatedEffect", "derivatives"]
+__all__ = ["OF_REFERENCE", "UNLISTED", "LocatedEffect"]
 
 _Floats = NDArray[np.float64]
 UNLISTED = "unlisted"
@@ -105,9 +105,7 @@ class LocatedEffect(AddedEffect):
         """Return what it adds to channels and reference, shape (n, c + 1)."""
         total = np.zeros((len(state.t), state.readings.shape[1] + 1))
         for operator, function in zip(self.where.operators(state), self.functions(state), strict=True):
-            columns = np.atleast_2d(function).T  # (n, 1) or (n, c + 1)
-            for part, values in zip(operator.parts, derivatives(operator, columns, state.period), strict=False):
-                total += 0.0 if part is None else part * values
+            total += operator.added(np.atleast_2d(function).T, state.period)  # of (n, 1) or (n, c + 1)
         return total
 
 
@@ -120,12 +118,3 @@ def _place(what: str, name: str, series: Sequence[str], array: AccelerometerArra
     for index, chip in enumerate(array.chips):
         members[chip.name] = tuple(np.flatnonzero(array.chip_of_channel == index).tolist())
     return channel_place(name, what, tuple(members[one] for one in series), series)
-
-
-def derivatives(operator: Operator, values: _Floats, period: float) -> list[_Floats]:
-    """Return values (n, …) and as many of their derivatives by time as an operator takes."""
-    found = [values]
-    last = max(order for order, part in enumerate(operator.parts) if part is not None)
-    for _ in range(last):
-        found.append(np.gradient(found[-1], period, axis=0, edge_order=2))
-    return found

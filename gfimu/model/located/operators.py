@@ -13,14 +13,15 @@ specific force of gravity and F that of the chip, all in that frame, and e′ a 
     the axis tilts by φ e′:        a·(φ̈ e′×r + 2ω φ̇ e′×(z×r) − φ e′×u)
     the table turns by φ more:     a·(φ̈ z×r + 2ω φ̇ z×(z×r)), and the reference reads it
 
-Each is A φ + B φ̇ + C φ̈ with A, B and C per observation. A free body has the places of `body_places` instead.
+Each is A φ + B φ̇ + C φ̈ with A, B and C per observation; what is read at another time is moved by φ(t). A free body
+has the places of `body_places` instead.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +29,7 @@ from numpy.typing import NDArray
 from gfimu.model.located.rig_state import RigState
 from gfimu.model.located.usual import USUAL
 
-__all__ = ["Operator", "Place", "body_places", "channel_place", "rig_places"]
+__all__ = ["Operator", "Place", "body_places", "channel_place", "derivatives", "moved", "rig_places"]
 
 _Floats = NDArray[np.float64]
 _Groups = tuple[tuple[int, ...], ...]
@@ -36,11 +37,23 @@ _Groups = tuple[tuple[int, ...], ...]
 
 @dataclass(frozen=True)
 class Operator:
-    """A φ + B φ̇ + C φ̈ on each observation, each of A, B and C (n, c + 1); None where it is zero."""
+    """What an error φ adds to each observation: A φ + B φ̇ + C φ̈, or s(t ± φ) − s(t) where it moves a signal in time.
+
+    Parameters
+    ----------
+    of_value, of_rate, of_acceleration : ndarray, shape (n, c + 1), optional
+        A, B and C; None where it is zero.
+    signal : ndarray, shape (n, c + 1), optional
+        What is read at another time; A is its derivative, with the sign of ``later``.
+    later : float
+        1 where what is read happened φ later than its time says, −1 where earlier.
+    """
 
     of_value: _Floats | None
     of_rate: _Floats | None = None
     of_acceleration: _Floats | None = None
+    signal: _Floats | None = None
+    later: float = 1.0
 
     @property
     def parts(self) -> tuple[_Floats | None, _Floats | None, _Floats | None]:
@@ -48,10 +61,63 @@ class Operator:
         return self.of_value, self.of_rate, self.of_acceleration
 
     @property
+    def order(self) -> int:
+        """Order of the highest derivative of φ that it takes."""
+        return max(order for order, part in enumerate(self.parts) if part is not None)
+
+    @cached_property
     def reached(self) -> NDArray[np.intp]:
         """Observations that it changes."""
         changed = [part.any(axis=0) for part in self.parts if part is not None]
         return np.flatnonzero(np.any(changed, axis=0))
+
+    def added(self, error: _Floats, period: float) -> _Floats:
+        """Return what an error (n, 1) or (n, c + 1) adds to the observations, shape (n, c + 1)."""
+        if self.signal is not None:
+            return moved(self.signal, self.later * error / period) - self.signal
+        every = zip(self.parts, derivatives(self, error, period), strict=False)
+        return np.asarray(sum(part * values for part, values in every if part is not None))
+
+    def averaged(self, means: Callable[[_Floats], _Floats]) -> Operator:
+        """Return A, B and C of means of the samples."""
+        value, rate, acceleration = (None if part is None else means(part) for part in self.parts)
+        return Operator(value, rate, acceleration)
+
+    def about(self, error: _Floats, period: float) -> Operator:
+        """Return what a small change of an error (n, 1) adds."""
+        if self.signal is None or self.of_value is None:
+            return self
+        return replace(self, of_value=moved(self.of_value, self.later * error / period))
+
+
+def derivatives(operator: Operator, values: _Floats, period: float) -> list[_Floats]:
+    """Return values (n, k) and as many of their derivatives by time as an operator takes."""
+    found = [values]
+    for _ in range(operator.order):
+        found.append(np.gradient(found[-1], period, axis=0, edge_order=2))
+    return found
+
+
+def moved(values: _Floats, share: _Floats) -> _Floats:
+    """Return smooth values (n, …) moved by shares of a sample (n, …), by the cubic through the four nearest.
+
+    Lagrange's form (Abramowitz and Stegun, 25.2.13). Values are known to one sample beyond the ends, by the cubic
+    through the outermost four, and stay from there on what they are there.
+    """
+    if len(values) < 4:
+        return values
+    at = np.arange(len(values)).reshape(-1, *[1] * (values.ndim - 1)) + share
+    at = np.clip(at, -1.0, float(len(values)))
+    first = np.clip(np.floor(at).astype(int) - 1, 0, len(values) - 4)
+    u = at - first
+    weights = (
+        -(u - 1.0) * (u - 2.0) * (u - 3.0) / 6.0,
+        u * (u - 2.0) * (u - 3.0) / 2.0,
+        -u * (u - 1.0) * (u - 3.0) / 2.0,
+        u * (u - 1.0) * (u - 2.0) / 6.0,
+    )
+    near = (np.take_along_axis(values, first + index, axis=0) for index in range(len(weights)))
+    return np.asarray(sum(weight * one for weight, one in zip(weights, near, strict=True)))
 
 
 @dataclass(frozen=True)
@@ -198,8 +264,9 @@ def _reads(state: RigState) -> list[Operator]:
 
 
 def _is_late(is_angle: bool, state: RigState) -> list[Operator]:
-    lost = state.spin.rate if is_angle else state.spin.acceleration
-    return [Operator(_observed(np.zeros_like(state.readings), -lost))]
+    none, spin = np.zeros_like(state.readings), state.spin
+    read, lost = (spin.angle, spin.rate) if is_angle else (spin.rate, spin.acceleration)
+    return [Operator(_observed(none, -lost), signal=_observed(none, read), later=-1.0)]
 
 
 def _turns(is_angle: bool, state: RigState) -> list[Operator]:
@@ -288,7 +355,8 @@ def _rigid(state: RigState) -> _Floats:
 
 
 def _gyro_is_late(state: RigState) -> list[Operator]:
-    return [Operator(_observed(np.gradient(_rigid(state), state.period, axis=0)))]
+    rigid = _rigid(state)
+    return [Operator(_observed(np.gradient(rigid, state.period, axis=0)), signal=_observed(rigid))]
 
 
 def _arms(state: RigState) -> list[Operator]:
@@ -298,26 +366,28 @@ def _arms(state: RigState) -> list[Operator]:
     return [_operator(_rigid(state), by_rate, by_acceleration)]
 
 
-def _on_groups(values: _Floats, groups: _Groups) -> list[Operator]:
-    """Return the operators of values (n, c) on each group of channels."""
-    operators = []
+def _on_groups(values: _Floats, groups: _Groups) -> list[_Floats]:
+    """Return values (n, c) of each group of channels and zeros elsewhere, (n, c + 1)."""
+    found = []
     for group in groups:
-        of_value = np.zeros((len(values), values.shape[1] + 1))
-        of_value[:, list(group)] = values[:, list(group)]
-        operators.append(Operator(of_value))
-    return operators
+        own = np.zeros((len(values), values.shape[1] + 1))
+        own[:, list(group)] = values[:, list(group)]
+        found.append(own)
+    return found
 
 
 def _offset(groups: _Groups, state: RigState) -> list[Operator]:
-    return _on_groups(np.ones_like(state.readings), groups)
+    return [Operator(own) for own in _on_groups(np.ones_like(state.readings), groups)]
 
 
 def _gain(groups: _Groups, state: RigState) -> list[Operator]:
-    return _on_groups(state.readings, groups)
+    return [Operator(own) for own in _on_groups(state.readings, groups)]
 
 
 def _delay(groups: _Groups, state: RigState) -> list[Operator]:
-    return _on_groups(np.gradient(state.readings, state.period, axis=0), groups)
+    changing = _on_groups(np.gradient(state.readings, state.period, axis=0), groups)
+    read = _on_groups(state.readings, groups)
+    return [Operator(own, signal=signal) for own, signal in zip(changing, read, strict=True)]
 
 
 _CHANNEL_KINDS: dict[str, tuple[str, str, float, Callable[[_Groups, RigState], Sequence[Operator]]]] = {

@@ -36,7 +36,9 @@ class LocatedPolicy:
     together : int
         Coefficients of narrow terms whose products are computed at once [count].
     averaged_hz : float
-        Rate of the averages on which what is slower than a quarter of it is screened [Hz].
+        Least rate of the averages on which terms are screened, four times that of a motion [Hz].
+    oversampled : float
+        The same over the highest frequency that a term adds to the motion [1].
     widths : tuple of float
         How wide the steps of that are, one after another [1].
     stretches, samples : int
@@ -83,6 +85,7 @@ class LocatedPolicy:
     least_information: float = 1e-9
     together: int = 128
     averaged_hz: float = 25.0
+    oversampled: float = 2.5
     widths: tuple[float, ...] = (1.0, 0.3, 0.1, 0.03)
     stretches: int = 2
     samples: int = 20_000

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,12 +14,12 @@ from gfimu.array.array import AccelerometerArray
 from gfimu.diagnosis.terms.cause import Cause
 from gfimu.diagnosis.terms.columns import Columns
 from gfimu.model.located.dependences import Dependence
-from gfimu.model.located.effect import LocatedEffect, derivatives
+from gfimu.model.located.effect import LocatedEffect
 from gfimu.model.located.operators import Operator, Place
 from gfimu.model.located.rig_state import RigState
 from gfimu.model.own_rig.places import Size
 
-__all__ = ["LocatedTerm", "is_located", "located_columns"]
+__all__ = ["LocatedTerm", "Shown", "is_located", "located_columns"]
 
 _Floats = NDArray[np.float64]
 
@@ -113,33 +113,72 @@ def is_located(cause: Cause) -> bool:
     return isinstance(cause.family, LocatedTerm)
 
 
+class Shown:
+    """How places and dependences show in a stretch: operators and functions on its observations, each made once.
+
+    Parameters
+    ----------
+    state : RigState
+        What the rig does.
+    averaged : callable
+        Makes means of samples (n, …), where terms are looked at on these.
+    """
+
+    def __init__(self, state: RigState, averaged: Callable[[_Floats], _Floats] = np.asarray) -> None:
+        self._state, self._averaged = state, averaged
+        self._operators: dict[tuple[str, str, tuple[str, ...]], list[Operator]] = {}
+        self._values: dict[Dependence, tuple[list[_Floats], list[_Floats]]] = {}
+
+    def operators(self, where: Place, at: LocatedEffect | None = None) -> list[Operator]:
+        """Return the operators of a place, about an error there if one is given."""
+        key = where.name, where.what, where.components
+        if key not in self._operators:
+            found = list(where.operators(self._state))
+            if at is not None and any(operator.signal is not None for operator in found):
+                every = zip(found, at.functions(self._state), strict=True)
+                found = [operator.about(error[:, None], self._state.period) for operator, error in every]
+            self._operators[key] = [one.averaged(self._averaged) for one in found]
+        return self._operators[key]
+
+    def functions(self, dependence: Dependence, order: int) -> list[_Floats]:
+        """Return the functions (n, K), or (c + 1, n, K), and their derivatives by time up to an order."""
+        exact, found = self._values.setdefault(dependence, ([], []))
+        while len(exact) <= order:
+            of = np.gradient(exact[-1], self._state.period, axis=-2, edge_order=2) if exact else None
+            exact.append(dependence.values(self._state) if of is None else of)
+            own = exact[-1]
+            found.append(self._averaged(own) if own.ndim < 3 else np.stack([*map(self._averaged, own)]))
+        return found
+
+
 def located_columns(
-    term: LocatedTerm, state: RigState, weight: _Floats, observed: Callable[[_Floats], _Floats] = np.asarray
+    term: LocatedTerm,
+    shown: Shown,
+    weight: _Floats,
+    observed: Callable[[_Floats], _Floats] = np.asarray,
+    at: LocatedEffect | None = None,
 ) -> Columns:
     """Return what each coefficient of a term, in its usual size, adds to observations weighed by (m, c + 1).
 
-    ``observed`` makes observations of values at the samples, where these differ (`BodyStretch.observed`).
+    ``observed`` makes observations of values at the samples, where these differ (`BodyStretch.observed`). ``at`` is the
+    effect about which coefficients change; none is zero.
     """
-    basis, operators = term.dependence.values(state), term.where.operators(state)
+    operators = shown.operators(term.where, at)
+    values = shown.functions(term.dependence, max(operator.order for operator in operators))
     count, observations = term.dependence.count, weight.shape[1]
     places: list[list[NDArray[np.intp]]] = [[] for _ in range(observations)]
     parts: list[list[_Floats]] = [[] for _ in range(observations)]
-    shared = [] if basis.ndim == 3 else derivatives(_longest(operators), basis, state.period)
     for index, operator in enumerate(operators):
         for c in operator.reached:
-            own = shared or derivatives(operator, basis[c], state.period)
-            column = np.zeros((len(state.t), count))
-            for part, values in zip(operator.parts, own, strict=False):
-                column += 0.0 if part is None else part[:, [c]] * values
+            own = [one[c] if one.ndim == 3 else one for one in values]
+            column = sum(
+                part[:, [c]] * value for part, value in zip(operator.parts, own, strict=False) if part is not None
+            )
             places[c].append(np.arange(index * count, (index + 1) * count))
-            parts[c].append(observed(column) * (term.where.usual * weight[:, [c]]))
+            parts[c].append(observed(np.asarray(column)) * (term.where.usual * weight[:, [c]]))
     empty = np.zeros((len(weight), 0))
     return Columns(
         term.count,
         tuple(np.concatenate(mine) if mine else np.zeros(0, dtype=np.intp) for mine in places),
         tuple(np.concatenate(mine, axis=1) if mine else empty for mine in parts),
     )
-
-
-def _longest(operators: Sequence[Operator]) -> Operator:
-    return max(operators, key=lambda one: max(order for order, part in enumerate(one.parts) if part is not None))

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from gfimu.diagnosis import Run, predicted_by_reference, prepare_run
 from gfimu.diagnosis.data.conversions import Conversions
 from gfimu.diagnosis.data.run import smooth_rate
-from gfimu.diagnosis.data.stretch import moved
 from gfimu.diagnosis.data.table.settling import settled
+from gfimu.model.located.operators import moved
 from gfimu.recording import Recording
 from sim import SpinState
 from sim.twin import Twin

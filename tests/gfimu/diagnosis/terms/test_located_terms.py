@@ -7,7 +7,7 @@ import pytest
 from no_name import Bent, Leaning, Sagging
 
 from gfimu import AccelerometerArray
-from gfimu.diagnosis import LocatedTerm, dependences, located_columns
+from gfimu.diagnosis import LocatedTerm, Shown, dependences, located_columns
 from gfimu.model import LocatedEffect, RigState, Wave, channel_place, rig_places
 from sim.effects import make_effect
 from sim.trials import random_profile
@@ -101,7 +101,7 @@ def test_a_leaning_array_is_one_that_is_tilted_and_moved():
 @pytest.mark.parametrize("dependence", ["f(omega)", "f(omega, alpha)", "revolution |omega|", "memory of alpha", "f(T)"])
 def test_columns_are_the_derivative_by_the_coefficients(place, dependence):
     term = LocatedTerm(PLACES[place], EVERY[dependence])
-    columns = located_columns(term, STATE, np.ones((len(T), 13)))
+    columns = located_columns(term, Shown(STATE), np.ones((len(T), 13)))
     rng = np.random.default_rng(3)
     sizes = rng.standard_normal(term.count)
     added = effect_of(term, term.where.usual * sizes).added(STATE)
