@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from gfimu.diagnosis.fit.coarse import Rows, coarse
 from gfimu.diagnosis.fit.evidence import inverse, log_evidence
 from gfimu.diagnosis.fit.gauss_newton import precision
 from gfimu.diagnosis.fit.linear import Point, linearise
+from gfimu.diagnosis.fit.parallel import each_apart
 from gfimu.diagnosis.fit.posterior import Posterior
 from gfimu.diagnosis.search.sets import Key
 from gfimu.diagnosis.search.waves import wave_terms
@@ -73,6 +74,22 @@ class _Seen:
         return self.rows.roots[:, None] * self.posterior.observed.weight
 
 
+@dataclass(frozen=True)
+class _Whole:
+    """A term whose products are taken, and the terms whose products follow: each with its mixing, None for itself."""
+
+    term: LocatedTerm
+    members: tuple[tuple[LocatedTerm, _Floats | None], ...]
+
+
+@dataclass(frozen=True)
+class _Batch:
+    """Terms that are looked at together, on averages of so many rows."""
+
+    most: int
+    wholes: tuple[_Whole, ...]
+
+
 class LocatedScreen:
     """Normal equations of located terms at a point, drives, slow noise and the causes there integrated out.
 
@@ -121,17 +138,28 @@ class LocatedScreen:
     def leaders_each(self, cases: Sequence[tuple[Key, float]]) -> list[list[Leader]]:
         """Return the same for several cases, each the causes that are left out and the least log odds."""
         of_rig, of_channels = self._terms()
+        every = [_Whole(term, ((term, None),)) for term in of_rig]
+        batches = self._batches([*every, *map(self._on_each_channel, of_channels)])
         found: list[list[Leader]] = [[] for _ in cases]
-        for term, gram, score in self._each(of_rig):
-            for (without, least), leaders in zip(cases, found, strict=True):
-                leaders.extend(self._judged(term, *self._beside(gram, score, without), least))
-        channels = {self._on_each_channel(some): some for some in of_channels}
-        for whole, gram, score in self._each(channels):
-            for (without, least), leaders in zip(cases, found, strict=True):
-                inner, right = self._beside(gram, score, without)
-                for term, mixing in self._patterns(channels[whole]):
-                    leaders.extend(self._judged(term, mixing.T @ inner @ mixing, mixing.T @ right, least))
+        for batch, estimates in zip(batches, each_apart(partial(self._estimates, cases), batches), strict=True):
+            for case, whole, member, estimate in estimates:
+                term, _ = batch.wholes[whole].members[member]
+                found[case].append(self._leader(term, estimate))
         return [sorted(leaders, key=lambda leader: -leader.log_odds) for leaders in found]
+
+    def _estimates(
+        self, cases: Sequence[tuple[Key, float]], batch: _Batch
+    ) -> list[tuple[int, int, int, tuple[float, int, _Floats]]]:
+        """Return the case, the number in a batch, the number among its members, and the estimate of each leader."""
+        found = []
+        for index, (gram, score) in enumerate(self._products(batch)):
+            for case, (without, least) in enumerate(cases):
+                inner, right = self._beside(gram, score, without)
+                for number, (term, mixing) in enumerate(batch.wholes[index].members):
+                    own = (inner, right) if mixing is None else (mixing.T @ inner @ mixing, mixing.T @ right)
+                    estimate = self._estimate(term, *own, least)
+                    found += [(case, index, number, estimate)] if estimate is not None else []
+        return found
 
     def _terms(self) -> tuple[list[LocatedTerm], list[ChannelTerms]]:
         """Return the terms of places in the rig, or on the body, and of channels."""
@@ -146,25 +174,28 @@ class LocatedScreen:
     def refined(self, leader: Leader, without: Key = frozenset()) -> Leader:
         """Return a leader at the most probable frequency, damping or order nearby."""
         for width in LOCATED.widths:
-            others = [replace(leader.term, dependence=dependence) for dependence in leader.term.dependence.near(width)]
-            for term, gram, score in self._each(others):
-                for other in self._judged(term, *self._beside(gram, score, without), leader.log_odds):
+            near = [replace(leader.term, dependence=dependence) for dependence in leader.term.dependence.near(width)]
+            for batch in self._batches([_Whole(term, ((term, None),)) for term in near]):
+                for _, whole, _, estimate in self._estimates([(without, leader.log_odds)], batch):
+                    other = self._leader(batch.wholes[whole].term, estimate)
                     leader = max(leader, other, key=lambda one: one.log_odds)
         return leader
 
-    def _each(self, terms: Iterable[LocatedTerm]) -> Iterator[tuple[LocatedTerm, _Floats, _Floats]]:
-        """Yield terms that are not too wide with the products of the causes' unknowns and their coefficients."""
-        waiting: dict[int, list[LocatedTerm]] = {}
-        for term in terms:
-            if term.count <= LOCATED.widest:
-                most = self._most(term)
-                some = waiting.setdefault(most, [])
-                if some and sum(one.count for one in some) + term.count > LOCATED.together:
-                    yield from self._products(some, most)
-                    some.clear()
-                some.append(term)
-        for most, some in waiting.items():
-            yield from self._products(some, most)
+    def _batches(self, wholes: Iterable[_Whole]) -> list[_Batch]:
+        """Return those that are not too wide in batches of which each needs the same averages."""
+        found: list[_Batch] = []
+        waiting: dict[int, list[_Whole]] = {}
+        for whole in wholes:
+            if whole.term.count > LOCATED.widest:
+                continue
+            most = self._most(whole.term)
+            self._averaged(most)  # once, and not in each of several processes
+            some = waiting.setdefault(most, [])
+            if some and sum(one.term.count for one in some) + whole.term.count > LOCATED.together:
+                found.append(_Batch(most, tuple(some)))
+                some.clear()
+            some.append(whole)
+        return [*found, *(_Batch(most, tuple(some)) for most, some in waiting.items())]
 
     def _most(self, term: LocatedTerm) -> int:
         """Return how many rows may be averaged to see a term: a power of two; one of a body's, which are averages."""
@@ -181,12 +212,12 @@ class LocatedScreen:
                 self._seen[most].append(_Seen(short, rows, Shown(state, rows.means), rows.of_columns(present)))
         return self._seen[most]
 
-    def _products(self, terms: Sequence[LocatedTerm], most: int) -> Iterator[tuple[LocatedTerm, _Floats, _Floats]]:
-        """Yield terms with G (P, P) and b (P,) of the causes' unknowns and their coefficients, relative to no sizes."""
-        held = len(self._sizes)
+    def _products(self, batch: _Batch) -> Iterator[tuple[_Floats, _Floats]]:
+        """Yield G (P, P) and b (P,) of the causes' unknowns and each term's coefficients, relative to no sizes."""
+        held, terms = len(self._sizes), [whole.term for whole in batch.wholes]
         count = held + sum(term.count for term in terms)
         gram, score = np.zeros((count, count)), np.zeros(count)
-        for stretch, seen in zip(self._stretches, self._averaged(most), strict=True):
+        for stretch, seen in zip(self._stretches, self._averaged(batch.most), strict=True):
             columns = [located_columns(term, seen.shown, seen.weight, stretch.observed) for term in terms]
             own, right, _ = seen.posterior.products(Columns.together([seen.present, *columns]))
             gram, score = gram + own, score + right
@@ -195,7 +226,7 @@ class LocatedScreen:
         for term in terms:
             mine = np.append(np.arange(held), np.arange(start, start + term.count))
             start += term.count
-            yield term, gram[np.ix_(mine, mine)], score[mine]
+            yield gram[np.ix_(mine, mine)], score[mine]
 
     def _beside(self, gram: _Floats, score: _Floats, without: Key) -> tuple[_Floats, _Floats]:
         """Return G and b of a term's coefficients, the causes but those left out integrated out."""
@@ -211,32 +242,35 @@ class LocatedScreen:
         gain = inverse(gram[np.ix_(held, held)] + np.diag(self._precision[held])) @ across
         return mine - across.T @ gain, right - gain.T @ score[held]
 
-    def _on_each_channel(self, some: ChannelTerms) -> LocatedTerm:
+    def _on_each_channel(self, some: ChannelTerms) -> _Whole:
         """Return an error of every channel by itself, from whose products those of all patterns follow."""
-        single = tuple((channel,) for channel in range(self._array.n_channels))
-        return LocatedTerm(channel_place("channel", some.kind, single, self._array.channels), some.dependence)
-
-    def _patterns(self, some: ChannelTerms) -> Iterator[tuple[LocatedTerm, _Floats]]:
-        """Yield the terms of an error of channels with how their coefficients mix those of single channels."""
+        channels, members = self._array.n_channels, []
         for term, groups in some.terms():
             if term.count <= LOCATED.widest:
-                mixing = np.zeros((self._array.n_channels, len(groups)))
+                mixing = np.zeros((channels, len(groups)))
                 for component, group in enumerate(groups):
                     mixing[list(group), component] = 1.0
-                yield term, np.asarray(np.kron(mixing, np.eye(some.dependence.count)))
+                members.append((term, np.asarray(np.kron(mixing, np.eye(some.dependence.count)))))
+        single = channel_place("channel", some.kind, tuple((c,) for c in range(channels)), self._array.channels)
+        return _Whole(LocatedTerm(single, some.dependence), tuple(members))
 
-    def _judged(self, term: LocatedTerm, gram: _Floats, score: _Floats, least: float) -> list[Leader]:
-        """Return a term at its most probable length scale; none where it is not seen or of no interest."""
+    def _estimate(
+        self, term: LocatedTerm, gram: _Floats, score: _Floats, least: float
+    ) -> tuple[float, int, _Floats] | None:
+        """Return the log odds, length scale and coordinates of a term; none where it is not seen or of no interest."""
         if not np.trace(gram) > LOCATED.least_information:
-            return []
-        prior = self._log_prior(term)
+            return None
         best: tuple[float, int, _Floats] | None = None
         for length, root in enumerate(term.dependence.roots):
             inner, right = _mixed(gram, score, root)
-            value = log_evidence(0.5 * (inner + inner.T), right) + prior
+            value = log_evidence(0.5 * (inner + inner.T), right) + self._log_prior(term)
             if np.isfinite(value) and value >= least and (best is None or value > best[0]):
                 best = value, length, np.asarray(np.linalg.solve(inner + np.eye(len(right)), right))
-        return [] if best is None else [Leader(best[0], term, term.cause(best[1], best[2], prior))]
+        return best
+
+    def _leader(self, term: LocatedTerm, estimate: tuple[float, int, _Floats]) -> Leader:
+        log_odds, length, coordinates = estimate
+        return Leader(log_odds, term, term.cause(length, coordinates, self._log_prior(term)))
 
     def _log_prior(self, term: LocatedTerm) -> float:
         alike = {"one": self._array.n_channels, "chip": len(self._array.chips)}.get(term.pattern, 1)
