@@ -67,8 +67,21 @@ def test_an_error_at_any_place_of_the_rig_comes_back_from_a_file(what):
 
 def test_the_error_of_an_angle_stays_one_of_an_angle():
     effect = effect_at(rig_places(is_angle=True)["late"], EVERY["1"])
-    late = again(effect).added(STATE)[:, -1]
-    np.testing.assert_allclose(late[4:-4], THEREFORE)
+    lateness = effect.coefficients[0]
+    expected = MOTION.at(T - lateness).angle - STATE.spin.angle
+    np.testing.assert_allclose(again(effect).added(STATE)[1:-1, -1], expected[1:-1], rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("size", [3e-4, 0.2])
+def test_what_is_late_is_read_at_another_time_however_late(size):
+    """The first order of 0.2 s would be wrong by as much as the reading itself."""
+    late = LocatedEffect(rig_places(is_angle=False)["late"], EVERY["1"], "all", np.array([size]))
+    delay = LocatedEffect(channel_place("clock", "delay", ((3, 4, 5),), ["a2"]), EVERY["1"], "chip", np.array([size]))
+    inside = np.abs(T - T.mean()) < 0.5 * np.ptp(T) - size
+    expected = (MOTION.at(T - size).rate - STATE.spin.rate)[inside]
+    np.testing.assert_allclose(late.added(STATE)[inside, -1], expected, rtol=0, atol=2e-6)
+    ahead = TWIN.predict(MOTION, T + size, temperature=WARM)[0] - TWIN.predict(MOTION, T, temperature=WARM)[0]
+    np.testing.assert_allclose(delay.added(STATE)[inside, 3:6], ahead[inside, 3:6], rtol=0, atol=2e-4)
 
 
 @pytest.mark.parametrize("what", ["leans", "reads", "turns"])

@@ -97,7 +97,7 @@ def test_a_leaning_array_is_one_that_is_tilted_and_moved():
     assert near(leans + moves, change(named("mount_tilt", y_rad=tilt))) < 0.02
 
 
-@pytest.mark.parametrize("place", PLACES)
+@pytest.mark.parametrize("place", sorted({*PLACES} - {"late"}))
 @pytest.mark.parametrize("dependence", ["f(omega)", "f(omega, alpha)", "revolution |omega|", "memory of alpha", "f(T)"])
 def test_columns_are_the_derivative_by_the_coefficients(place, dependence):
     term = LocatedTerm(PLACES[place], EVERY[dependence])
@@ -106,6 +106,20 @@ def test_columns_are_the_derivative_by_the_coefficients(place, dependence):
     sizes = rng.standard_normal(term.count)
     added = effect_of(term, term.where.usual * sizes).added(STATE)
     np.testing.assert_allclose(columns.times(sizes), added, rtol=0, atol=1e-9 * np.abs(added).max())
+
+
+@pytest.mark.parametrize(
+    "where",
+    [PLACES["late"], channel_place("clock", "delay", ((0, 1, 2), (3, 4, 5)), ["a1", "a2"])],
+    ids=["late", "delay"],
+)
+def test_columns_of_what_is_late_are_the_derivative_about_the_lateness(where):
+    term, rng = LocatedTerm(where, EVERY["f(T)"]), np.random.default_rng(3)
+    about, change = 0.05 * rng.standard_normal(term.count), 1e-3 * rng.standard_normal(term.count)
+    columns = located_columns(term, Shown(STATE), np.ones((len(T), 13)), at=effect_of(term, about))
+    ends = [effect_of(term, about + sign * where.usual * change).added(STATE) for sign in (0.5, -0.5)]
+    exact = ends[0] - ends[1]
+    np.testing.assert_allclose(columns.times(change)[5:-5], exact[5:-5], rtol=0, atol=5e-3 * np.abs(exact).max())
 
 
 def test_a_bench_shakes_as_the_exact_effect_does():
