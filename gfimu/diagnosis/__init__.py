@@ -55,7 +55,7 @@ if TYPE_CHECKING:
     from gfimu.diagnosis.time_limit import check_time, limited_to
     from gfimu.diagnosis.verdict.extension import that_predict
     from gfimu.diagnosis.verdict.likely_mistakes import likely_mistake
-    from gfimu.diagnosis.verdict.located import located_cause, of_free_time
+    from gfimu.diagnosis.verdict.located import experiment_between, located_cause, of_free_time
     from gfimu.diagnosis.verdict.parts import Located, ReferenceClock
     from gfimu.diagnosis.verdict.sample_notes import with_reference_clock, with_sample_notes
     from gfimu.diagnosis.verdict.verdict import Diagnosis

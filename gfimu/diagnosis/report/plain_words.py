@@ -283,6 +283,7 @@ def _calibrate_first(diagnosis: Diagnosis) -> list[str]:
 
 def _by_verdict(diagnosis: Diagnosis) -> list[str]:
     """Return the steps that each verdict asks for."""
+    remedies = dict.fromkeys(one.would_be_separated_by for one in diagnosis.causes if one.would_be_separated_by)
     match diagnosis.verdict:
         case "nothing_found" if diagnosis.calibration_residue:
             return ["Keep twin.toml, which has the corrections, or calibrate the unit again."]
@@ -293,7 +294,6 @@ def _by_verdict(diagnosis: Diagnosis) -> list[str]:
             )
             return [step]
         case "ambiguous":
-            remedies = dict.fromkeys(one.would_be_separated_by for one in diagnosis.causes if one.would_be_separated_by)
             apart = [f"To separate the candidates, record: {remedy}." for remedy in remedies]
             return [*apart, "Give both recordings to one call of gfimu diagnose; it fits them together."]
         case "unknown" if diagnosis.interrupted:
@@ -304,7 +304,9 @@ def _by_verdict(diagnosis: Diagnosis) -> list[str]:
             steps = [place or "Look at the residual views of the report for where the discrepancy sits."]
             if diagnosis.unexplained.mistake:
                 steps = [f"Check the files: {diagnosis.unexplained.mistake}."]
-            return [*steps, "Record another run with another motion: what stays is in the rig or the sensors."]
+            apart = [f"To decide between what fits as well, record: {remedy}." for remedy in remedies]
+            other = "Record another run with another motion: what stays is in the rig or the sensors."
+            return [*steps, *(apart or [other])]
         case _:
             more = "no more than what is left unexplained" if diagnosis.unexplained.significant else "nothing"
             return [

@@ -19,9 +19,29 @@ from gfimu.diagnosis.verdict.parts import FunctionTable, Located, NamedCause
 from gfimu.model.located.effect import UNLISTED
 from gfimu.model.located.rig_state import RigState
 
-__all__ = ["located_cause", "of_free_time"]
+__all__ = ["experiment_between", "located_cause", "of_free_time"]
 
 _Floats = NDArray[np.float64]
+
+_TURNS = "slow turns through several revolutions"
+_AGAIN = "the same motion once more, at another time"
+_QUICK = "quick starts and stops"
+_SHOWN_BY = {
+    "omega": "held speeds, slow and fast, both ways",
+    "alpha": _QUICK,
+    "memory": _QUICK,
+    "mode": _QUICK,
+    "theta": _TURNS,
+    "revolution": _TURNS,
+    "order": _TURNS,
+    "t": _AGAIN,
+    "tone": _AGAIN,
+    "step": _AGAIN,
+    "T": "the same motion with a cold board and with a warm one",
+    "own": "the array turned over on the table",
+}
+"""The recording that shows by itself what an error goes with, by the first word of the kind of its dependence."""
+_ELSEWHERE = "the array at another place on the table, and turned there"
 
 
 def located_cause(explanation: Explanation, fit: Fit, cause: Cause, policy: Policy) -> NamedCause:
@@ -71,6 +91,7 @@ def located_cause(explanation: Explanation, fit: Fit, cause: Cause, policy: Poli
         {},
         {},
         found.place_probability,
+        would_be_separated_by=experiment_between(term, others),
         why=text,
         log_odds=0.0 if without is None else float(fit.log_posterior - without.log_posterior),
         unlisted=found,
@@ -79,6 +100,18 @@ def located_cause(explanation: Explanation, fit: Fit, cause: Cause, policy: Poli
 
 def _terms(fit: Fit) -> list[LocatedTerm]:
     return [cause.family for cause in fit.causes if isinstance(cause.family, LocatedTerm)]
+
+
+def experiment_between(term: LocatedTerm, others: Sequence[LocatedTerm]) -> str:
+    """Return what to record to tell a term from others that fit as well; empty where there are none."""
+    found: list[str] = []
+    for other in others:
+        kinds = [one.dependence.kind.split(",")[0].split(" ")[0] for one in (term, other)]
+        if kinds[0] != kinds[1]:
+            found += [_SHOWN_BY[kind] for kind in kinds if kind in _SHOWN_BY]
+        elif other.where.name != term.where.name:
+            found.append(_ELSEWHERE)
+    return " and ".join(dict.fromkeys(found))
 
 
 def of_free_time(places: Sequence[FreeTime], policy: Policy) -> NamedCause:
@@ -99,7 +132,16 @@ def of_free_time(places: Sequence[FreeTime], policy: Policy) -> NamedCause:
         instead=tuple(one.where.words for one in close),
     )
     why = found.text
-    return NamedCause(UNLISTED, {}, {}, found.place_probability, why=why, log_odds=best.log_odds, unlisted=found)
+    return NamedCause(
+        UNLISTED,
+        {},
+        {},
+        found.place_probability,
+        would_be_separated_by=_ELSEWHERE if close else "",
+        why=why,
+        log_odds=best.log_odds,
+        unlisted=found,
+    )
 
 
 def _words(term: LocatedTerm) -> str:

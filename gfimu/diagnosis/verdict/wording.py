@@ -15,6 +15,7 @@ from gfimu.diagnosis.verdict.parts import NamedCause, Residual, Unexplained, is_
 __all__ = ["SAME_SHARE", "Notes", "verdict_sentences"]
 
 SAME_SHARE = 5e-3  # numerical: half of the last digit of a share in words
+_FEW = 2  # numerical: alternatives in a sentence; all are in ``verdict.json``
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,9 @@ def verdict_sentences(
     """Return the verdict in sentences, the most important first; ``withdrawn`` are causes that did not predict."""
     words = [_headline(verdict, causes, unexplained, notes.residue, gain)]
     words += [f"{cause.effect}: {cause.why}." for cause in causes if cause.why and cause.unlisted is None]
-    words += [_sentence(cause.why) for cause in causes if cause.unlisted is not None]
+    for cause in causes:
+        if cause.unlisted is not None:
+            words += [_sentence(cause.why), *_instead(cause.unlisted.instead, cause.would_be_separated_by)]
     words += _coincidences(verdict, causes)
     if causes:
         words.append(f"The residual {_course(residual)} m/s²; the noise alone is {residual.noise_floor:.3g} m/s².")
@@ -77,6 +80,14 @@ def _coincidences(verdict: str, causes: Sequence[NamedCause]) -> list[str]:
         for cause in causes
         if cause.not_distinguishable_from and verdict != "ambiguous"
     ]
+
+
+def _instead(others: Sequence[str], remedy: str) -> list[str]:
+    """Say what fits as well as something without a name, and what to record to decide."""
+    if not others:
+        return []
+    decide = f"; to decide, record {remedy}" if remedy else ""
+    return [f"These data fit as well if {' or '.join(others[:_FEW])}{decide}."]
 
 
 def _held_out(residual: Residual, gain: Gain) -> list[str]:

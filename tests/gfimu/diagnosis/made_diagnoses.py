@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -85,7 +86,9 @@ def made_diagnosis(verdict: str = "explained", *, seed: int = 1) -> Diagnosis:
             instead=("the axis tilts in the room, always",),
             function=table,
         )
-        causes = (NamedCause("unlisted", {}, {}, 0.88, why=located.text, log_odds=230.0, unlisted=located),)
+        remedy = "held speeds, slow and fast, both ways"
+        cause = NamedCause("unlisted", {}, {}, 0.88, would_be_separated_by=remedy, why=located.text, log_odds=230.0)
+        causes = (replace(cause, unlisted=located),)
         unexplained = Unexplained(True, located.text, 240.0)
     rivals = (Rival(("axis_wobble",), -120.0, "its inertial part at high rate is not in the data"),)
     return Diagnosis(

@@ -94,6 +94,10 @@ def test_unknown():
     (bare, *_) = told("unknown", unexplained=unexplained)
     assert bare == f"{words[0][:-1]}: the offset of a11 changes, at 5 Hz."
     assert words[1].startswith("The reference reads otherwise than the table turns, as a function of the rate")
+    assert words[2] == (
+        "These data fit as well if the axis tilts in the room, always; "
+        "to decide, record held speeds, slow and fast, both ways."
+    )
     assert any(one.startswith("The residual falls") for one in words)
     assert not any("significant residual remains" in one for one in words)
 
