@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from gfimu.diagnosis.terms.library import cause_columns, family_columns
     from gfimu.diagnosis.terms.located.alternatives import dependences
     from gfimu.diagnosis.terms.located.policy import LOCATED
-    from gfimu.diagnosis.terms.located.term import LocatedTerm, Shown, located_columns
+    from gfimu.diagnosis.terms.located.term import LocatedBasis, LocatedTerm, located_columns
     from gfimu.diagnosis.terms.observed import observe
     from gfimu.diagnosis.terms.reach import behind_wiring, disjoint
     from gfimu.diagnosis.time_limit import check_time, limited_to

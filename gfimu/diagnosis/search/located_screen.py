@@ -31,7 +31,7 @@ from gfimu.diagnosis.terms.located.alternatives import (
     rig_terms,
 )
 from gfimu.diagnosis.terms.located.policy import LOCATED
-from gfimu.diagnosis.terms.located.term import LocatedTerm, Shown, located_columns
+from gfimu.diagnosis.terms.located.term import LocatedBasis, LocatedTerm, located_columns
 from gfimu.model.located.operators import channel_place
 from gfimu.model.world_model import reads_place
 
@@ -60,12 +60,12 @@ class Leader:
 
 
 @dataclass(frozen=True)
-class _Seen:
-    """A stretch on averages of some rows: its posterior, its rows, what shows in them, and the present columns."""
+class _AveragedStretch:
+    """A stretch averaged over groups of rows: its posterior, the groups, the basis, and the columns of the causes."""
 
     posterior: Posterior
     rows: Rows
-    shown: Shown
+    basis: LocatedBasis
     present: Columns
 
     @cached_property
@@ -75,8 +75,11 @@ class _Seen:
 
 
 @dataclass(frozen=True)
-class _Whole:
-    """A term whose products are taken, and the terms whose products follow: each with its mixing, None for itself."""
+class _TermGroup:
+    """A term whose normal equations are computed, and its members, whose equations follow by a mixing (None: the same).
+
+    An error of every channel by itself has as members the errors of one channel, of a chip and of all channels.
+    """
 
     term: LocatedTerm
     members: tuple[tuple[LocatedTerm, _Floats | None], ...]
@@ -84,10 +87,10 @@ class _Whole:
 
 @dataclass(frozen=True)
 class _Batch:
-    """Terms that are looked at together, on averages of so many rows."""
+    """Groups of terms whose normal equations are computed together, on averages of up to ``most`` rows."""
 
     most: int
-    wholes: tuple[_Whole, ...]
+    groups: tuple[_TermGroup, ...]
 
 
 class LocatedScreen:
@@ -118,7 +121,7 @@ class LocatedScreen:
         }
         self._is_body = isinstance(stretches[0], BodyStretch)
         self._fastest = max(float(np.abs(state.spin.rate).max()) for state in self._states)
-        self._seen: dict[int, list[_Seen]] = {}
+        self._by_rows: dict[int, list[_AveragedStretch]] = {}
         self._sizes = np.zeros(len(self._precision))
         for cause in point.causes:
             self._sizes[self._unknowns[cause.key][: len(cause.coordinates)]] = cause.coordinates
@@ -138,12 +141,12 @@ class LocatedScreen:
     def leaders_each(self, cases: Sequence[tuple[Key, float]]) -> list[list[Leader]]:
         """Return the same for several cases, each the causes that are left out and the least log odds."""
         of_rig, of_channels = self._terms()
-        every = [_Whole(term, ((term, None),)) for term in of_rig]
-        batches = self._batches([*every, *map(self._on_each_channel, of_channels)])
+        alone = [_TermGroup(term, ((term, None),)) for term in of_rig]
+        batches = self._batches([*alone, *map(self._on_each_channel, of_channels)])
         found: list[list[Leader]] = [[] for _ in cases]
         for batch, estimates in zip(batches, each_apart(partial(self._estimates, cases), batches), strict=True):
-            for case, whole, member, estimate in estimates:
-                term, _ = batch.wholes[whole].members[member]
+            for case, index, member, estimate in estimates:
+                term, _ = batch.groups[index].members[member]
                 found[case].append(self._leader(term, estimate))
         return [sorted(leaders, key=lambda leader: -leader.log_odds) for leaders in found]
 
@@ -155,7 +158,7 @@ class LocatedScreen:
         for index, (gram, score) in enumerate(self._products(batch)):
             for case, (without, least) in enumerate(cases):
                 inner, right = self._beside(gram, score, without)
-                for number, (term, mixing) in enumerate(batch.wholes[index].members):
+                for number, (term, mixing) in enumerate(batch.groups[index].members):
                     own = (inner, right) if mixing is None else (mixing.T @ inner @ mixing, mixing.T @ right)
                     estimate = self._estimate(term, *own, least)
                     found += [(case, index, number, estimate)] if estimate is not None else []
@@ -175,26 +178,26 @@ class LocatedScreen:
         """Return a leader at the most probable frequency, damping or order nearby."""
         for width in LOCATED.widths:
             near = [replace(leader.term, dependence=dependence) for dependence in leader.term.dependence.near(width)]
-            for batch in self._batches([_Whole(term, ((term, None),)) for term in near]):
-                for _, whole, _, estimate in self._estimates([(without, leader.log_odds)], batch):
-                    other = self._leader(batch.wholes[whole].term, estimate)
+            for batch in self._batches([_TermGroup(term, ((term, None),)) for term in near]):
+                for _, index, _, estimate in self._estimates([(without, leader.log_odds)], batch):
+                    other = self._leader(batch.groups[index].term, estimate)
                     leader = max(leader, other, key=lambda one: one.log_odds)
         return leader
 
-    def _batches(self, wholes: Iterable[_Whole]) -> list[_Batch]:
+    def _batches(self, groups: Iterable[_TermGroup]) -> list[_Batch]:
         """Return those that are not too wide in batches of which each needs the same averages."""
         found: list[_Batch] = []
-        waiting: dict[int, list[_Whole]] = {}
-        for whole in wholes:
-            if whole.term.count > LOCATED.widest:
+        waiting: dict[int, list[_TermGroup]] = {}
+        for group in groups:
+            if group.term.count > LOCATED.widest:
                 continue
-            most = self._most(whole.term)
+            most = self._most(group.term)
             self._averaged(most)  # once, and not in each of several processes
             some = waiting.setdefault(most, [])
-            if some and sum(one.term.count for one in some) + whole.term.count > LOCATED.together:
+            if some and sum(one.term.count for one in some) + group.term.count > LOCATED.together:
                 found.append(_Batch(most, tuple(some)))
                 some.clear()
-            some.append(whole)
+            some.append(group)
         return [*found, *(_Batch(most, tuple(some)) for most, some in waiting.items())]
 
     def _most(self, term: LocatedTerm) -> int:
@@ -203,22 +206,23 @@ class LocatedScreen:
         whole = 1 if self._is_body else max(int(1.0 / (needed * self._stretches[0].run.sample_period)), 1)
         return int(2 ** (whole.bit_length() - 1))
 
-    def _averaged(self, most: int) -> list[_Seen]:
-        """Return the stretches on averages of so many rows."""
-        if most not in self._seen:
-            self._seen[most] = []
+    def _averaged(self, most: int) -> list[_AveragedStretch]:
+        """Return the stretches averaged over groups of up to so many rows."""
+        if most not in self._by_rows:
+            self._by_rows[most] = []
             for state, posterior, present in zip(self._states, self._posteriors, self._present, strict=True):
                 short, rows = coarse(posterior, most)
-                self._seen[most].append(_Seen(short, rows, Shown(state, rows.means), rows.of_columns(present)))
-        return self._seen[most]
+                basis = LocatedBasis(state, rows.means)
+                self._by_rows[most].append(_AveragedStretch(short, rows, basis, rows.of_columns(present)))
+        return self._by_rows[most]
 
     def _products(self, batch: _Batch) -> Iterator[tuple[_Floats, _Floats]]:
         """Yield G (P, P) and b (P,) of the causes' unknowns and each term's coefficients, relative to no sizes."""
-        held, terms = len(self._sizes), [whole.term for whole in batch.wholes]
+        held, terms = len(self._sizes), [group.term for group in batch.groups]
         count = held + sum(term.count for term in terms)
         gram, score = np.zeros((count, count)), np.zeros(count)
         for stretch, seen in zip(self._stretches, self._averaged(batch.most), strict=True):
-            columns = [located_columns(term, seen.shown, seen.weight, stretch.observed) for term in terms]
+            columns = [located_columns(term, seen.basis, seen.weight, stretch.observed) for term in terms]
             own, right, _ = seen.posterior.products(Columns.together([seen.present, *columns]))
             gram, score = gram + own, score + right
         score += gram[:, :held] @ self._sizes
@@ -242,7 +246,7 @@ class LocatedScreen:
         gain = inverse(gram[np.ix_(held, held)] + np.diag(self._precision[held])) @ across
         return mine - across.T @ gain, right - gain.T @ score[held]
 
-    def _on_each_channel(self, some: ChannelTerms) -> _Whole:
+    def _on_each_channel(self, some: ChannelTerms) -> _TermGroup:
         """Return an error of every channel by itself, from whose products those of all patterns follow."""
         channels, members = self._array.n_channels, []
         for term, groups in some.terms():
@@ -252,7 +256,7 @@ class LocatedScreen:
                     mixing[list(group), component] = 1.0
                 members.append((term, np.asarray(np.kron(mixing, np.eye(some.dependence.count)))))
         single = channel_place("channel", some.kind, tuple((c,) for c in range(channels)), self._array.channels)
-        return _Whole(LocatedTerm(single, some.dependence), tuple(members))
+        return _TermGroup(LocatedTerm(single, some.dependence), tuple(members))
 
     def _estimate(
         self, term: LocatedTerm, gram: _Floats, score: _Floats, least: float

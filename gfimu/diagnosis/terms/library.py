@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gfimu.diagnosis.data.stretch import NoPredictionError, Stretch
 from gfimu.diagnosis.terms.cause import Cause, effects_of
 from gfimu.diagnosis.terms.columns import Columns
-from gfimu.diagnosis.terms.located.term import LocatedTerm, Shown, located_columns
+from gfimu.diagnosis.terms.located.term import LocatedBasis, LocatedTerm, located_columns
 from gfimu.diagnosis.terms.reach import behind_wiring, disjoint
 from gfimu.model.located.effect import LocatedEffect
 from gfimu.model.world_model import Effect, EffectFamily
@@ -81,7 +81,7 @@ def cause_columns(stretch: Stretch, seen: Seen, drive: Nuisance, causes: Sequenc
         if isinstance(cause.family, LocatedTerm):
             state, own = stretch.state(present, drive.spin), present[number]
             assert isinstance(own, LocatedEffect)
-            columns = located_columns(cause.family, Shown(state), seen.weight, stretch.observed, own)
+            columns = located_columns(cause.family, LocatedBasis(state, about=own), seen.weight, stretch.observed)
             found.append(columns.mixed(cause.mixing))
             continue
         count = len(cause.coordinates)

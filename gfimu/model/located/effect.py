@@ -112,7 +112,7 @@ class LocatedEffect(AddedEffect):
 def _place(what: str, name: str, series: Sequence[str], array: AccelerometerArray, *, is_angle: bool) -> Place:
     """Return a place by what the error there is; of channels with the series that it is of."""
     places = rig_places(is_angle=is_angle) | body_places()
-    if what in places:
+    if what in places and places[what].name == name:  # the gain of all channels is of the supply
         return places[what]
     members: dict[str, tuple[int, ...]] = {channel: (index,) for index, channel in enumerate(array.channels)}
     for index, chip in enumerate(array.chips):

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from gfimu.model.located.rig_state import RigState
 from gfimu.model.located.usual import USUAL
 
-__all__ = ["Operator", "Place", "body_places", "channel_place", "derivatives", "moved", "rig_places"]
+__all__ = ["Operator", "Place", "body_places", "channel_place", "moved", "rig_places"]
 
 _Floats = NDArray[np.float64]
 _Groups = tuple[tuple[int, ...], ...]
@@ -75,8 +75,11 @@ class Operator:
         """Return what an error (n, 1) or (n, c + 1) adds to the observations, shape (n, c + 1)."""
         if self.signal is not None:
             return moved(self.signal, self.later * error / period) - self.signal
-        every = zip(self.parts, derivatives(self, error, period), strict=False)
-        return np.asarray(sum(part * values for part, values in every if part is not None))
+        total, derivative = np.zeros_like(error), error
+        for order, part in enumerate(self.parts[: self.order + 1]):
+            derivative = np.gradient(derivative, period, axis=0, edge_order=2) if order else derivative
+            total = total if part is None else total + part * derivative
+        return total
 
     def averaged(self, means: Callable[[_Floats], _Floats]) -> Operator:
         """Return A, B and C of means of the samples."""
@@ -88,14 +91,6 @@ class Operator:
         if self.signal is None or self.of_value is None:
             return self
         return replace(self, of_value=moved(self.of_value, self.later * error / period))
-
-
-def derivatives(operator: Operator, values: _Floats, period: float) -> list[_Floats]:
-    """Return values (n, k) and as many of their derivatives by time as an operator takes."""
-    found = [values]
-    for _ in range(operator.order):
-        found.append(np.gradient(found[-1], period, axis=0, edge_order=2))
-    return found
 
 
 def moved(values: _Floats, share: _Floats) -> _Floats:

@@ -59,6 +59,14 @@ def test_a_function_of_any_kind_comes_back_from_a_file(dependence):
     np.testing.assert_allclose(again(effect).added(STATE), effect.added(STATE), rtol=0, atol=1e-12)
 
 
+@pytest.mark.parametrize("kind", ["offset", "gain", "delay"])
+def test_an_error_of_channels_of_any_kind_comes_back_from_a_file(kind):
+    """The gain of channels is another place than that of the supply, which all channels share."""
+    where = channel_place("channel", kind, ((4,), (0,)), ["a22", "a11"])
+    effect = effect_at(where, EVERY["t"], "own")
+    np.testing.assert_allclose(again(effect).added(STATE), effect.added(STATE), rtol=0, atol=1e-12)
+
+
 @pytest.mark.parametrize("what", rig_places(is_angle=False))
 def test_an_error_at_any_place_of_the_rig_comes_back_from_a_file(what):
     effect = effect_at(rig_places(is_angle=False)[what], EVERY["omega^2"])

@@ -19,7 +19,7 @@ from gfimu.model.located.operators import Operator, Place
 from gfimu.model.located.rig_state import RigState
 from gfimu.model.own_rig.places import Size
 
-__all__ = ["LocatedTerm", "Shown", "is_located", "located_columns"]
+__all__ = ["LocatedBasis", "LocatedTerm", "is_located", "located_columns"]
 
 _Floats = NDArray[np.float64]
 
@@ -113,31 +113,39 @@ def is_located(cause: Cause) -> bool:
     return isinstance(cause.family, LocatedTerm)
 
 
-class Shown:
-    """How places and dependences show in a stretch: operators and functions on its observations, each made once.
+class LocatedBasis:
+    """Operators of places and basis functions of dependences on the rows of one stretch, each computed once.
 
     Parameters
     ----------
     state : RigState
-        What the rig does.
+        Motion, readings and temperature of the stretch.
     averaged : callable
-        Makes means of samples (n, …), where terms are looked at on these.
+        Averages samples (n, …) over groups of neighbouring rows; the identity for the samples themselves.
+    about : LocatedEffect, optional
+        Effect about which the operators of its place are linearised; about zero error by default.
     """
 
-    def __init__(self, state: RigState, averaged: Callable[[_Floats], _Floats] = np.asarray) -> None:
-        self._state, self._averaged = state, averaged
+    def __init__(
+        self,
+        state: RigState,
+        averaged: Callable[[_Floats], _Floats] = np.asarray,
+        about: LocatedEffect | None = None,
+    ) -> None:
+        self._state, self._averaged, self._about = state, averaged, about
         self._operators: dict[tuple[str, str, tuple[str, ...]], list[Operator]] = {}
         self._values: dict[Dependence, tuple[list[_Floats], list[_Floats]]] = {}
 
-    def operators(self, where: Place, at: LocatedEffect | None = None) -> list[Operator]:
-        """Return the operators of a place, about an error there if one is given."""
-        key = where.name, where.what, where.components
+    def operators(self, where: Place) -> list[Operator]:
+        """Return the operator of each component of a place."""
+        key, about = (where.name, where.what, where.components), self._about
         if key not in self._operators:
-            found = list(where.operators(self._state))
-            if at is not None and any(operator.signal is not None for operator in found):
-                every = zip(found, at.functions(self._state), strict=True)
-                found = [operator.about(error[:, None], self._state.period) for operator, error in every]
-            self._operators[key] = [one.averaged(self._averaged) for one in found]
+            operators = list(where.operators(self._state))
+            if about is not None and about.where is where and any(one.signal is not None for one in operators):
+                errors = about.functions(self._state)  # (components, n)
+                period = self._state.period
+                operators = [one.about(error[:, None], period) for one, error in zip(operators, errors, strict=True)]
+            self._operators[key] = [one.averaged(self._averaged) for one in operators]
         return self._operators[key]
 
     def functions(self, dependence: Dependence, order: int) -> list[_Floats]:
@@ -153,18 +161,16 @@ class Shown:
 
 def located_columns(
     term: LocatedTerm,
-    shown: Shown,
+    basis: LocatedBasis,
     weight: _Floats,
     observed: Callable[[_Floats], _Floats] = np.asarray,
-    at: LocatedEffect | None = None,
 ) -> Columns:
     """Return what each coefficient of a term, in its usual size, adds to observations weighed by (m, c + 1).
 
-    ``observed`` makes observations of values at the samples, where these differ (`BodyStretch.observed`). ``at`` is the
-    effect about which coefficients change; none is zero.
+    ``observed`` makes observations of values at the samples, where these differ (`BodyStretch.observed`).
     """
-    operators = shown.operators(term.where, at)
-    values = shown.functions(term.dependence, max(operator.order for operator in operators))
+    operators = basis.operators(term.where)
+    values = basis.functions(term.dependence, max(operator.order for operator in operators))
     count, observations = term.dependence.count, weight.shape[1]
     places: list[list[NDArray[np.intp]]] = [[] for _ in range(observations)]
     parts: list[list[_Floats]] = [[] for _ in range(observations)]

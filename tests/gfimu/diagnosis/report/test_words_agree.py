@@ -39,7 +39,7 @@ KINDS = {
 
 
 @pytest.fixture(scope="module", params=KINDS)
-def told(request):
+def reported(request):
     """A verdict with its sentences, its headline and steps, and the text of its page."""
     found = KINDS[request.param]()
     sentences = verdict_sentences(found.verdict, found.causes, found.residual, found.gain, found.unexplained, ())
@@ -49,8 +49,8 @@ def told(request):
     return found, (" ".join(sentences), f"{headline(found)} {' '.join(next_steps(found))}", text)
 
 
-def test_a_name_is_said_where_it_is_a_cause_and_nowhere_else(told):
-    found, (sentences, steps, page) = told
+def test_a_name_is_said_where_it_is_a_cause_and_nowhere_else(reported):
+    found, (sentences, steps, page) = reported
     named = {cause.effect for cause in found.causes if cause.unlisted is None}
     for name in named:
         assert name in sentences
@@ -60,8 +60,8 @@ def test_a_name_is_said_where_it_is_a_cause_and_nowhere_else(told):
         assert other not in steps
 
 
-def test_shares_and_probabilities_are_the_same_everywhere(told):
-    found, (sentences, _, page) = told
+def test_shares_and_probabilities_are_the_same_everywhere(reported):
+    found, (sentences, _, page) = reported
     if found.gain.held_out:
         share = found.gain.share_of_excess_removed
         assert f"{100 * share:.1f} % of the excess" in sentences
@@ -71,8 +71,8 @@ def test_shares_and_probabilities_are_the_same_everywhere(told):
         assert percent(chance) in page
 
 
-def test_the_residual_of_the_sentence_is_the_one_of_the_page(told):
-    found, (sentences, _, page) = told
+def test_the_residual_of_the_sentence_is_the_one_of_the_page(reported):
+    found, (sentences, _, page) = reported
     if found.causes:
         before, after = (f"{one:.3g}" for one in (found.residual.rms_before, found.residual.rms_after))
         assert (f"from {before} to {after}" in sentences) == (before != after)
@@ -80,8 +80,8 @@ def test_the_residual_of_the_sentence_is_the_one_of_the_page(told):
     assert f"{found.residual.rms_before:#.3g}" in page
 
 
-def test_a_place_its_rivals_and_what_decides_are_in_all_three(told):
-    found, (sentences, steps, page) = told
+def test_a_place_its_rivals_and_what_decides_are_in_all_three(reported):
+    found, (sentences, steps, page) = reported
     for cause in found.causes:
         if cause.unlisted is None:
             continue
@@ -95,8 +95,8 @@ def test_a_place_its_rivals_and_what_decides_are_in_all_three(told):
         assert "None named" not in page
 
 
-def test_nothing_is_not_said_beside_something(told):
-    found, (sentences, steps, page) = told
+def test_nothing_is_not_said_beside_something(reported):
+    found, (sentences, steps, page) = reported
     nothing = "agrees with the measurement" in sentences
     assert nothing == (found.verdict == "nothing_found")
     if nothing:

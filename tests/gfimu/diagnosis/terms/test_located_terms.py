@@ -7,7 +7,7 @@ import pytest
 from no_name import Bent, Leaning, Sagging
 
 from gfimu import AccelerometerArray
-from gfimu.diagnosis import LocatedTerm, Shown, dependences, located_columns
+from gfimu.diagnosis import LocatedBasis, LocatedTerm, dependences, located_columns
 from gfimu.model import LocatedEffect, RigState, Wave, channel_place, rig_places
 from sim.effects import make_effect
 from sim.trials import random_profile
@@ -101,7 +101,7 @@ def test_a_leaning_array_is_one_that_is_tilted_and_moved():
 @pytest.mark.parametrize("dependence", ["f(omega)", "f(omega, alpha)", "revolution |omega|", "memory of alpha", "f(T)"])
 def test_columns_are_the_derivative_by_the_coefficients(place, dependence):
     term = LocatedTerm(PLACES[place], EVERY[dependence])
-    columns = located_columns(term, Shown(STATE), np.ones((len(T), 13)))
+    columns = located_columns(term, LocatedBasis(STATE), np.ones((len(T), 13)))
     rng = np.random.default_rng(3)
     sizes = rng.standard_normal(term.count)
     added = effect_of(term, term.where.usual * sizes).added(STATE)
@@ -116,7 +116,7 @@ def test_columns_are_the_derivative_by_the_coefficients(place, dependence):
 def test_columns_of_what_is_late_are_the_derivative_about_the_lateness(where):
     term, rng = LocatedTerm(where, EVERY["f(T)"]), np.random.default_rng(3)
     about, change = 0.05 * rng.standard_normal(term.count), 1e-3 * rng.standard_normal(term.count)
-    columns = located_columns(term, Shown(STATE), np.ones((len(T), 13)), at=effect_of(term, about))
+    columns = located_columns(term, LocatedBasis(STATE, about=effect_of(term, about)), np.ones((len(T), 13)))
     ends = [effect_of(term, about + sign * where.usual * change).added(STATE) for sign in (0.5, -0.5)]
     exact = ends[0] - ends[1]
     np.testing.assert_allclose(columns.times(change)[5:-5], exact[5:-5], rtol=0, atol=5e-3 * np.abs(exact).max())
