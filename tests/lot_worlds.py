@@ -1,13 +1,14 @@
 """Worlds outside the library drawn by lot: a place of the rig, what the error there goes with, a form, and where.
 
-Importing it enters the effects ``lot_000`` … into `FOREIGN`, as exact physics of the generators there (moved and turned
-chips, late samples, …) with forms that are no functions of the engine's. The lot was drawn once; nothing was set on it.
+The generators of `foreign_world` make them with the effects ``lot_000`` … , exact physics (moved and turned chips, late
+samples, …) with forms that are no functions of the engine's. The lot was drawn once; nothing was set on it.
 """
 
 from dataclasses import dataclass, replace
+from unittest.mock import patch
 
+import foreign_world
 import numpy as np
-from foreign_world import hide, hide_in_campaign, new_recording
 
 from sim.trials.benchmark.generators.foreign_effect import Foreign
 from sim.trials.benchmark.generators.foreign_effects import FOREIGN
@@ -131,9 +132,9 @@ def _draw(lot, rng, plan):
     }
 
 
-def _entered(number, lot):
+def _effect(lot):
     shape = ("place", "quantity", "pattern", "form", "order", "rise", "bend", "luck")
-    FOREIGN[f"lot_{number:03d}"] = Foreign(
+    return Foreign(
         STAGE.get(lot.place, "analogue"),
         PLACE.get(lot.place, "chip"),
         f"{lot.quantity}: {lot.place}, {lot.pattern}",
@@ -142,7 +143,6 @@ def _entered(number, lot):
         shape=shape,
         most=("size", {"late": 0.1, "delay": 0.03}.get(lot.place, np.inf)),
     )
-    return Case("lot", 700_000 + number, (f"lot_{number:03d}",), SIZES[number // 2 % 3])
 
 
 def _lots(count):
@@ -158,6 +158,12 @@ def _lots(count):
 
 
 LOTS = _lots(42)
-_EVERY = [_entered(number, lot) for number, lot in enumerate(LOTS)]
+EFFECTS = {f"lot_{number:03d}": _effect(lot) for number, lot in enumerate(LOTS)}
+_EVERY = [Case("lot", 700_000 + number, (name,), SIZES[number // 2 % 3]) for number, name in enumerate(EFFECTS)]
 CASES = {"hide": _EVERY[::2], "hide_in_campaign": _EVERY[1::2]}
 """Cases by the name of the generator; a seed's remainder by three is the kind of its profile."""
+
+_with_lots = patch.dict(FOREIGN, EFFECTS)  # while a generator runs, no longer
+hide = _with_lots(foreign_world.hide)
+hide_in_campaign = _with_lots(foreign_world.hide_in_campaign)
+new_recording = _with_lots(foreign_world.new_recording)
