@@ -20,7 +20,7 @@ from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.challenge import challenged
 from gfimu.diagnosis.search.explain import Explanation, reduced
 from gfimu.diagnosis.search.long_run import understand_any_length
-from gfimu.diagnosis.search.nuisance_models import Understanding
+from gfimu.diagnosis.search.nuisance_models import Understanding, understood
 from gfimu.diagnosis.terms.located.policy import LOCATED
 from gfimu.diagnosis.terms.located.term import is_located
 from gfimu.diagnosis.verdict.conclude import conclude, is_dominant, is_unknown, named_causes
@@ -83,9 +83,10 @@ class Steps:
             self._report(start + (end - start) * share, text)
 
         try:
-            return replace(understanding, explanation=challenged(understanding.explanation, self._policy, report))
+            explanation = challenged(understanding.explanation, self._policy, report)
         except np.linalg.LinAlgError:  # without a solution there is nothing to compare
             return understanding
+        return understood(explanation, self._policy, understanding.log_odds, understanding.model)
 
     def verdict(self, understanding: Understanding) -> Diagnosis:
         """Return the verdict on what a search found."""

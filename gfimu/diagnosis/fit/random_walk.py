@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from gfimu.diagnosis.terms.coloured_noise import likeliest_flicker
 from gfimu.diagnosis.terms.observed import Observed
 from gfimu.diagnosis.terms.slow_modes import WeighedPowers
 
-__all__ = ["Walk", "slow_powers", "walk_strength", "whittle"]
+__all__ = ["Walk", "as_it_walks", "slow_powers", "walk_strength", "whittle"]
 
 _STRENGTHS = np.geomspace(2e-3, 0.5, 28)  # numerical: grid of a random walk's strength, m/s² per √s
 
@@ -75,6 +75,13 @@ def walk_strength(stretches: Sequence[Stretch], point: Point, policy: Policy = P
     unequal = -float(chi2.logsf(apart, totals.shape[1] - 1))
     odds = float(common[best] - without) if mean > policy.least_walk else 0.0
     return Walk(mean, float(np.hypot(std, policy.walk_to_drive * mean)), odds, unequal)
+
+
+def as_it_walks(stretches: Sequence[Stretch], point: Point, policy: Policy = Policy()) -> Point:
+    """Return the point with biases that walk as its residual shows, or do not walk where that is not likely."""
+    walk = walk_strength(stretches, point, policy)
+    strength = walk.strength if walk.is_likely(policy) else 0.0
+    return replace(point, levels=tuple(replace(level, walk=strength) for level in point.levels))
 
 
 def slow_powers(stretch: Stretch, seen: Observed) -> WeighedPowers:

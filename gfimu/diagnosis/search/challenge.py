@@ -16,6 +16,7 @@ from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.gauss_newton import FEW, Fit, fit
 from gfimu.diagnosis.fit.learn import learn_noise, learn_roughness
 from gfimu.diagnosis.fit.linear import Point, with_residue
+from gfimu.diagnosis.fit.random_walk import as_it_walks
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.explain import Explanation, Report, explained, leading_words
 from gfimu.diagnosis.search.located_screen import Leader, LocatedScreen
@@ -76,7 +77,9 @@ def challenged(explanation: Explanation, policy: Policy, report: Report = lambda
         ]
         rivals = sorted((*explanation.rivals, *others), key=lambda one: -one.log_posterior)
         return replace(explanation, rivals=tuple(rivals))
-    point = replace(best.point, causes=found.best.causes)
+    walk = found.best.point.levels[0].walk
+    levels = tuple(replace(level, walk=walk) for level in best.point.levels)
+    point = replace(best.point, causes=found.best.causes, levels=levels)
     if best.point.residue is not None:
         point = with_residue(stretches, point, best.point.residue.scale)
     sets = Sets(stretches, learn_noise(stretches, learn_roughness(stretches, point)), policy)
@@ -125,7 +128,8 @@ def challenge(
         report(round_ / LOCATED.terms, leading_words("places", leading))
         if is_body:  # the evidence is that of one misfit of the noise, and compares with no other
             settled, nothing = {leading.key: leading}, fit(stretches, replace(leading.point, causes=()), policy)
-        fewer = _fewer(stretches, leading, policy)
+        leading, fewer = _without_the_idle(stretches, leading, policy)
+        settled[leading.key] = leading
         needed = _needed(leading, fewer, nothing, policy)
         tried = _tried(stretches, leading, fewer, needed, policy)
         for one in tried:
@@ -158,6 +162,16 @@ def _needed(leading: Fit, fewer: Sequence[Fit], nothing: Fit, policy: Policy) ->
 
 def _gains(one: Fit, other: Fit) -> float:
     return one.log_posterior - other.log_posterior
+
+
+def _without_the_idle(stretches: Sequence[Stretch], leading: Fit, policy: Policy) -> tuple[Fit, list[Fit]]:
+    """Return a set without causes whose loss makes it more probable, and what `_fewer` returns of that."""
+    while True:
+        fewer = _fewer(stretches, leading, policy)
+        best = max(fewer, key=lambda one: one.log_posterior, default=leading)
+        if _gains(best, leading) <= 0.0:
+            return leading, fewer
+        leading = best
 
 
 def _fewer(stretches: Sequence[Stretch], found: Fit, policy: Policy) -> list[Fit]:
@@ -227,9 +241,11 @@ def _refined(stretches: Sequence[Stretch], found: Fit, policy: Policy) -> Fit:
 
 
 def _settled(stretches: Sequence[Stretch], found: Fit, policy: Policy) -> Fit:
-    """Return a fit under the roughness and the noise that it leaves."""
-    point = learn_noise(stretches, learn_roughness(stretches, found.point))
-    return fit(stretches, point, replace(policy, steps=FEW))
+    """Return a fit under the roughness and the noise that it leaves; what walked may be what it describes."""
+    point = learn_roughness(stretches, found.point)
+    if point.levels[0].walk > 0.0 and stretches[0].first_levels.walk == 0.0:
+        point = as_it_walks(stretches, point, policy)
+    return fit(stretches, learn_noise(stretches, point), replace(policy, steps=FEW))
 
 
 def _first_of_each_shape(leaders: Sequence[Leader]) -> list[Leader]:

@@ -15,11 +15,10 @@ from itertools import chain
 import numpy as np
 
 from gfimu.diagnosis.data.body.stretch import BodyStretch
-from gfimu.diagnosis.data.cosine_basis import NoiseLevels
 from gfimu.diagnosis.data.stretch import Stretch
 from gfimu.diagnosis.fit.learn import learn_noise
 from gfimu.diagnosis.fit.linear import Point, linearise, with_residue
-from gfimu.diagnosis.fit.random_walk import Walk, walk_strength
+from gfimu.diagnosis.fit.random_walk import Walk, as_it_walks, walk_strength
 from gfimu.diagnosis.policy import Policy
 from gfimu.diagnosis.search.explain import Explanation, exactly, explain
 from gfimu.diagnosis.search.sets import Sets, has_stalled, prune
@@ -27,7 +26,7 @@ from gfimu.diagnosis.terms.jacobian import Jacobian
 from gfimu.diagnosis.terms.residue import Residue
 from gfimu.diagnosis.time_limit import what_ended
 
-__all__ = ["Understanding", "understand"]
+__all__ = ["Understanding", "understand", "understood"]
 
 Report = Callable[[float, str], None]
 
@@ -83,7 +82,7 @@ def understand(
         Names of the only alternatives to white noise and bias instability alone that are searched; all by default.
     """
     progress = report or (lambda share, text: None)
-    found = [_understood(stretches, explain(stretches, policy, report=lambda s, text: progress(0.6 * s, text)), policy)]
+    found = [understood(explain(stretches, policy, report=lambda s, text: progress(0.6 * s, text)), policy)]
     if found[0].explanation.interrupted:
         return found[0]
     alternatives = [one for one in _models(stretches, policy) if models is None or one.name in models]
@@ -114,7 +113,7 @@ def _add_alternatives(
             explanation = explain(stretches, policy, start=start)
             if explanation.interrupted:
                 raise KeyboardInterrupt(explanation.interrupted)
-            other = _understood(stretches, explanation, policy, odds, model.name)
+            other = understood(explanation, policy, odds, model.name)
             # What looked like a random walk beside some causes may be no such thing beside the best of that model.
             if other.walk is None or other.walk.is_likely(policy):
                 found.append(other)
@@ -196,11 +195,8 @@ def _with_residue(stretches: Sequence[Stretch], point: Point, _: _Taken, scale: 
 
 def _walking(stretches: Sequence[Stretch], point: Point, taken: _Taken, policy: Policy) -> Point | None:
     """Return the point with biases that walk as its residuals do, if they do, and the bias instability beside that."""
-    walk = walk_strength(stretches, point, policy)
-    if not walk.is_likely(policy):
-        return None
-    levels = tuple(NoiseLevels(level.white, level.flicker, walk.strength) for level in point.levels)
-    return learn_noise(stretches, replace(point, levels=levels), taken)
+    walking = as_it_walks(stretches, point, policy)
+    return learn_noise(stretches, walking, taken) if walking.levels[0].walk > 0.0 else None
 
 
 class _Derivatives:
@@ -269,10 +265,21 @@ def _promise(stretches: Sequence[Stretch], before: Point, after: Point, taken: _
     return values[1] - values[0]
 
 
-def _understood(
-    stretches: Sequence[Stretch], explanation: Explanation, policy: Policy, odds: float = 0.0, model: str = ""
-) -> Understanding:
-    point = explanation.best.point
+def understood(explanation: Explanation, policy: Policy, odds: float = 0.0, model: str = "") -> Understanding:
+    """Return an explanation with what its point says of the nuisance parameters.
+
+    Parameters
+    ----------
+    explanation : Explanation
+        Under one model of them.
+    policy : Policy
+        Thresholds of `walk_strength`.
+    odds : float
+        That this model needs.
+    model : str
+        Its name.
+    """
+    stretches, point = explanation.stretches, explanation.best.point
     walk = None
     if point.levels[0].walk > 0.0 and stretches[0].first_levels.walk == 0.0:
         walk = walk_strength(stretches, point, policy)

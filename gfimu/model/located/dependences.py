@@ -426,11 +426,15 @@ _ENVELOPES: dict[str, Callable[[_Floats], _Floats]] = {
 
 @dataclass(frozen=True)
 class Revolution(Dependence):
-    """A function of the angle within a revolution, by harmonics, times what its name says of rate over ``scale``."""
+    """A function of the angle within a revolution, by harmonics, times what its name says of rate over ``scale``.
+
+    With ``mean``, its mean is a coefficient too, the last; of some length scales the prior keeps that at zero.
+    """
 
     name: str
     scale: float = 1.0
     harmonics: int = USUAL.harmonics
+    mean: bool = True
     kind: str = "revolution"
     words: str = "by the angle within a revolution"
 
@@ -441,18 +445,21 @@ class Revolution(Dependence):
     @property
     def numbers(self) -> dict[str, Any]:
         """What makes it."""
-        return {"scale": self.scale, "harmonics": self.harmonics}
+        return {"scale": self.scale, "harmonics": self.harmonics, "mean": self.mean}
 
     @property
     def roots(self) -> tuple[_Floats, ...]:
-        """Roots of the prior covariance, one for each length scale."""
+        """Roots of the prior covariance, one for each length scale, without a mean and with one."""
         order: _Floats = np.repeat(np.arange(1.0, self.harmonics + 1), 2)
-        return np.diag(1.0 / np.sqrt(order)), np.diag(1.0 / order**2)
+        every = [np.diag(np.append(one, self.mean)) for one in (1.0 / np.sqrt(order), 1.0 / order**2)]
+        return (*(one[:, :-1] for one in every), *every) if self.mean else tuple(one[:-1, :-1] for one in every)
 
     def values(self, state: RigState) -> _Floats:
         """Return the functions at the samples."""
         phase = np.outer(state.spin.angle, np.arange(1, self.harmonics + 1))
         waves = np.stack([np.cos(phase), np.sin(phase)], axis=2).reshape(len(phase), -1)
+        if self.mean:
+            waves = np.column_stack([waves, np.ones(len(phase))])
         return np.asarray(waves * _ENVELOPES[self.name](state.spin.rate / self.scale)[:, None])
 
 
@@ -795,7 +802,9 @@ _MADE: tuple[tuple[str, Callable[[re.Match[str], Mapping[str, Any]], Dependence]
     (r"f\((\w+)\)", lambda m, n: _curve(m[1], n)),
     (
         r"revolution.*",
-        lambda m, n: Revolution(_one_of(m[0], _ENVELOPES), _positive(n, "scale"), _count(n["harmonics"])),
+        lambda m, n: Revolution(
+            _one_of(m[0], _ENVELOPES), _positive(n, "scale"), _count(n["harmonics"]), mean=n.get("mean", False) is True
+        ),
     ),
     (r"order .*", lambda m, n: Wave(_positive(n, "cycles"), 1.0, fastest=_finite(n, "fastest"))),
     (r"step at .*", lambda m, n: Step(_finite(n, "at"), 1.0)),

@@ -124,7 +124,7 @@ def _of_temperature(states: Sequence[RigState]) -> list[Dependence]:
 _OF_REFERENCE = (
     *("1", "f(omega)", "f(alpha)", "f(omega, alpha)", "f(theta)", "revolution", "revolution |omega|"),
     *("revolution omega", "memory of alpha", "omega", "omega^2", "omega^3", "|omega|"),
-    *("omega|omega|", "|alpha|", "alpha omega", "theta"),
+    *("omega|omega|", "|alpha|", "alpha omega", "theta", "t", "f(t)", "T", "f(T)"),
 )
 _OF_RIG = (
     *("f(omega)", "f(alpha)", "f(theta)", "revolution", "revolution |omega|", "revolution omega^2", "f(t)"),
