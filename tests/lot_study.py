@@ -1,6 +1,6 @@
 """How the diagnosis does outside its library: runs the worlds of `lot_worlds` and prints its table.
 
-python tests/lot_study.py --out lot --workers 2
+python tests/lot_study.py --out lot --workers 2 --half second
 """
 
 import argparse
@@ -84,8 +84,11 @@ def main():
     parser = argparse.ArgumentParser(description="Diagnose worlds outside the library, drawn by lot.")
     parser.add_argument("--out", type=Path, required=True, help="folder of the run")
     parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--half", choices=("first", "second"), default="second", help="which of the two draws")
     options = parser.parse_args()
-    dataset = Dataset.create(options.out, PlanFile({"world": list(JOBS)}, kind="lot", batch=1))
+    second = options.half == "second"
+    worlds = [key for key, (_, case) in JOBS.items() if (case.seed >= 700_000 + lot_worlds.HALF) is second]
+    dataset = Dataset.create(options.out, PlanFile({"world": worlds}, kind="lot", batch=1))
     run_campaign(
         dataset, run_world, partial(open_workers, options.workers), progress=lambda *counts: print(*counts, flush=True)
     )

@@ -1,7 +1,8 @@
 """Worlds outside the library drawn by lot: a place of the rig, what the error there goes with, a form, and where.
 
 The generators of `foreign_world` make them with the effects ``lot_000`` … , exact physics (moved and turned chips, late
-samples, …) with forms that are no functions of the engine's. The lot was drawn once; nothing was set on it.
+samples, …) with forms that are no functions of the engine's. Each half was drawn once. The first showed which terms the
+engine lacked, the second was drawn afterwards; nothing was set on that.
 """
 
 from dataclasses import dataclass, replace
@@ -145,9 +146,9 @@ def _effect(lot):
     )
 
 
-def _lots(count):
-    rng, found = np.random.default_rng(20261129), []
-    while len(found) < count:
+def _lots(seed):
+    rng, found = np.random.default_rng(seed), []
+    while len(found) < HALF:
         place = str(rng.choice(list(GOES_WITH)))
         pattern = str(rng.choice(["one", "chip", "own"])) if PLACE.get(place, "chip") == "chip" else "all"
         pattern = str(rng.choice(["one", "own"])) if place == "delay" else pattern
@@ -157,7 +158,8 @@ def _lots(count):
     return found
 
 
-LOTS = _lots(42)
+HALF = 42
+LOTS = _lots(20261129) + _lots(20261130)
 EFFECTS = {f"lot_{number:03d}": _effect(lot) for number, lot in enumerate(LOTS)}
 _EVERY = [Case("lot", 700_000 + number, (name,), SIZES[number // 2 % 3]) for number, name in enumerate(EFFECTS)]
 CASES = {"hide": _EVERY[::2], "hide_in_campaign": _EVERY[1::2]}

@@ -226,13 +226,13 @@ def channel_terms(
     others = ("memory of alpha", "revolution omega", "force change")
     offsets = [one for name, one in every.items() if name not in others]
     modes = _modes(states, (ACCELERATION, RATE_SQUARED), (2,)) if states[0].body is None else []
-    gains = ("1", "f(omega)", "f(t)", "omega", "omega^2", "|omega|", "t", "f(T)")
-    late = ("1", "t", "f(t)")
+    gains = ("1", "f(omega)", "f(alpha)", "f(theta)", "revolution", "f(t)", "omega", "omega^2", "|omega|", "t", "f(T)")
+    late = ("1", "t", "f(t)", "f(T)")
     steps = tuple(name for name, one in every.items() if isinstance(one, Step))
     return [
         *(ChannelTerms("offset", one, (*each, *of_chip)) for one in (*offsets, *readings)),
-        *(ChannelTerms("gain", every[name], (*each, *alike)) for name in (*gains, *steps) if name in every),
-        *(ChannelTerms("delay", every[name], tuple(clocks)) for name in late),
+        *(ChannelTerms("gain", every[name], (*each, *of_chip, *alike)) for name in (*gains, *steps) if name in every),
+        *(ChannelTerms("delay", every[name], tuple(clocks)) for name in late if name in every),
         *(ChannelTerms("offset", mode, of_chip) for mode in modes),
     ]
 
