@@ -11,7 +11,11 @@ from gfimu.base.lazy_names import declared_names
 
 if TYPE_CHECKING:
     from gfimu.model.generic_basis import OF_READING
-    from gfimu.model.located.dependences import ACCELERATION, FORCES, Mode, VectorForm, Wave, dependence_of
+    from gfimu.model.located.dependences.by_name import dependence_of
+    from gfimu.model.located.dependences.forms import VectorForm
+    from gfimu.model.located.dependences.memories import Mode
+    from gfimu.model.located.dependences.regressors import ACCELERATION, FORCES
+    from gfimu.model.located.dependences.waves import Wave
     from gfimu.model.located.effect import LocatedEffect
     from gfimu.model.located.operators import Operator, body_places, channel_place, rig_places
     from gfimu.model.located.rig_state import RigState

@@ -12,7 +12,7 @@ from gfimu.array.array import AccelerometerArray
 from gfimu.diagnosis.terms.located.alternatives import ChannelTerms, channel_patterns
 from gfimu.diagnosis.terms.located.policy import LOCATED
 from gfimu.diagnosis.terms.located.term import LocatedTerm
-from gfimu.model.located.dependences import Wave
+from gfimu.model.located.dependences.waves import Wave
 from gfimu.model.located.operators import Operator, rig_places
 from gfimu.model.located.rig_state import RigState
 

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from gfimu.array.array import AccelerometerArray
 from gfimu.base.errors import InputError
-from gfimu.model.located.dependences import Dependence, dependence_of
+from gfimu.model.located.dependences.by_name import dependence_of
+from gfimu.model.located.dependences.dependence import Dependence
 from gfimu.model.located.operators import Place, body_places, channel_place, rig_places
 from gfimu.model.located.rig_state import AddedEffect, RigState
 

@@ -161,6 +161,15 @@ def test_a_name_that_is_no_dependence_is_an_error():
         dependence_of("f(luck)", {"low": 0.0, "high": 1.0, "warp": 0.0, "functions": 8})
 
 
+def test_a_function_of_a_revolution_without_word_of_its_mean_has_none():
+    """Twins of before the mean was a coefficient."""
+    numbers = {"scale": 1.0, "harmonics": 8}
+    old, new = (dependence_of("revolution", {**numbers, **more}) for more in ({}, {"mean": True}))
+    assert (old.count, new.count) == (16, 17)
+    np.testing.assert_array_equal(new.values(STATE)[:, :-1], old.values(STATE))
+    np.testing.assert_array_equal(new.values(STATE)[:, -1], 1.0)
+
+
 @pytest.mark.parametrize("where", [OFFSETS, rig_places(is_angle=False)["reads"]])
 def test_a_twin_predicts_what_goes_with_the_temperature(where):
     effect = effect_at(where, EVERY["T"])

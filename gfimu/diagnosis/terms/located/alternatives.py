@@ -11,7 +11,11 @@ from numpy.typing import NDArray
 from gfimu.array.array import AccelerometerArray
 from gfimu.diagnosis.terms.located.policy import LOCATED
 from gfimu.diagnosis.terms.located.term import LocatedTerm
-from gfimu.model.located.dependences import (
+from gfimu.model.located.dependences.curves import OfReading, Product, curve_over
+from gfimu.model.located.dependences.dependence import Dependence
+from gfimu.model.located.dependences.forms import Form, Step, vector_forms
+from gfimu.model.located.dependences.memories import LowPassed, Memory, Mode
+from gfimu.model.located.dependences.regressors import (
     ACCELERATION,
     ANGLE,
     FORCES,
@@ -20,19 +24,9 @@ from gfimu.model.located.dependences import (
     TEMPERATURE,
     TIME,
     WARMING,
-    Dependence,
-    Form,
-    LowPassed,
-    Memory,
-    Mode,
-    OfReading,
-    Product,
     Regressor,
-    Revolution,
-    Step,
-    curve_over,
-    vector_forms,
 )
+from gfimu.model.located.dependences.waves import Revolution
 from gfimu.model.located.operators import body_places, channel_place, rig_places
 from gfimu.model.located.rig_state import RigState
 from gfimu.model.located.usual import USUAL

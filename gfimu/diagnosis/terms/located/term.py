@@ -13,7 +13,7 @@ from scipy.linalg import block_diag
 from gfimu.array.array import AccelerometerArray
 from gfimu.diagnosis.terms.cause import Cause
 from gfimu.diagnosis.terms.columns import Columns
-from gfimu.model.located.dependences import Dependence
+from gfimu.model.located.dependences.dependence import Dependence
 from gfimu.model.located.effect import LocatedEffect
 from gfimu.model.located.operators import Operator, Place
 from gfimu.model.located.rig_state import RigState

@@ -28,11 +28,13 @@ TWIN = having(Twin(array=AccelerometerArray.load("cube12"), array_name="cube12")
 POLICY = Policy()
 
 
-def found_in(effects=(), *, seed=5, change=None, twin=TWIN):
+def found_in(effects=(), *, seed=5, change=None, gain=None, twin=TWIN):
     """The verdict on a recording with effects that the library of the twin may lack."""
     recording = measure(np.random.default_rng(seed), TWIN, effects, Measurement(duration=25.0))
     if change is not None:
         recording = replace(recording, readings=recording.readings + change(recording.t_s))
+    if gain is not None:
+        recording = replace(recording, readings=recording.readings * (1.0 + gain(recording))[:, None])
     return diagnose([recording], twin)
 
 
@@ -73,6 +75,37 @@ def test_an_array_that_leans_is_located_beside_a_cause_that_has_a_name():
     assert located.dependence in {"alpha", "f(alpha)", "memory of alpha"}
     assert found.in_part or found.verdict == "unknown"
     assert found.gain.share_of_excess_removed > 0.95
+
+
+def slow(t):
+    """Rises and falls, from zero."""
+    return np.tanh(t / 6.0) - 1.5 * np.exp(-0.5 * ((t - 15.0) / 4.0) ** 2)
+
+
+def only(found):
+    """The only cause of a verdict, which has no name: place, what is wrong there, and the kind of dependence."""
+    (cause,) = found.causes
+    return cause.unlisted.place, cause.unlisted.what, cause.unlisted.dependence
+
+
+def test_a_gain_that_follows_time_is_no_random_walk_of_the_biases():
+    """Before it is described, what changes slowly in all channels looks like a walk."""
+    twin = having(TWIN, "scale_factor", "bias_random_walk")
+    assert only(found_in(gain=lambda run: 0.012 * slow(run.t_s), twin=twin)) == ("supply", "gain", "f(t)")
+
+
+def test_a_gain_that_follows_the_angle_has_a_mean_and_no_scale_factor_beside_it():
+    def gain(run):
+        angle = np.concatenate([[0.0], np.cumsum(np.diff(run.t_s) * run.reference["tacho_rad_s"][1:])])
+        return 2e-3 * np.exp(np.cos(2.0 * angle + 0.4))
+
+    assert only(found_in(gain=gain)) == ("supply", "gain", "revolution")
+
+
+def test_a_reference_that_drifts_goes_with_time():
+    assert only(found_in([Bent(0.04, lambda spin: slow(np.linspace(0.0, 25.0, len(spin.rate))))])) == (
+        *("reference", "reads", "f(t)"),
+    )
 
 
 def test_a_tone_on_one_channel_is_located_with_its_frequency_and_left_out_of_the_twin():

@@ -1,0 +1,1 @@
+"""Dependences: what an unknown function is of (motion, angle, time, temperature, a reading), with a prior."""
