@@ -34,6 +34,7 @@ __all__ = [
     "form_figure",
     "function_figure",
     "marked_figure",
+    "measured_figure",
     "rig_figures",
     "spectrum_figure",
     "trace_figure",
@@ -44,6 +45,7 @@ _BEFORE, _AFTER = css(BEFORE_ON_PAPER), css(AFTER_ON_PAPER)
 _NOISE, _INK, _PALE = css(NOISE_ON_PAPER), css(INK), css(PALE)
 _LIMITS = PlotLimits()
 _MANY = 24  # channels, of more of which pictures are coarser so that the page stays small
+_COMPARED, _COMPARED_S = 2, 4.0  # channels, and seconds, of measured beside predicted
 _MOST_POINTS = 4000
 _MOST_FREQUENCIES = 1200
 _COARSE_DPI = 55
@@ -70,6 +72,28 @@ def trace_figure(run: RunView, size: ResidualSize) -> str:
         axis.set_ylabel("m/s²")
         axis.set_xlabel("time, s")
         _legend_above(axis)
+        return svg_text(figure)
+
+
+def measured_figure(run: RunView, size: ResidualSize) -> str:
+    """Draw the two channels that were worst as measured and as predicted, where the prediction errs most."""
+    period = float(np.median(np.diff(run.t))) if len(run.t) > 1 else 1.0
+    worst = np.argsort(-np.nan_to_num(size.before / size.floor, nan=-1.0, posinf=0.0), kind="stable")[:_COMPARED]
+    errors = np.where(run.valid, run.measured - run.before, 0.0)[:, worst] / size.floor[worst]  # (n, 2)
+    power = uniform_filter1d(np.nan_to_num(errors**2).sum(axis=1), max(round(_COMPARED_S / period), 1), mode="constant")
+    middle = run.t[int(np.argmax(power))]
+    near = np.abs(run.t - middle) <= 0.5 * _COMPARED_S
+    with mpl.rc_context(ON_PAGE):
+        figure = Figure(figsize=(_VIEW[0], 1.6 * len(worst)), layout="constrained")
+        axes = figure.subplots(len(worst), 1, sharex=True, squeeze=False)[:, 0]
+        for channel, axis in zip(worst, axes, strict=True):
+            seen = np.where(run.valid[near, channel], run.measured[near, channel], np.nan)
+            axis.plot(run.t[near], seen, ".", color=_INK, markersize=2.0, label="measured", rasterized=True)
+            for one, colour, label in ((run.before, _BEFORE, "as given"), (run.after, _AFTER, "extended")):
+                axis.plot(run.t[near], one[near, channel], color=colour, linewidth=1.2, label=label)
+            axis.set_ylabel(f"{short_name(size.channels[channel])}, m/s²")
+        axes[-1].set_xlabel("time, s")
+        _legend_above(axes[0])
         return svg_text(figure)
 
 

@@ -93,7 +93,7 @@ def _content(diagnosis: Diagnosis, rig: DrawnRig) -> Mapping[str, Any]:
         "plots": zooming,
         "plot_rule": _plot_rule(plots["residual"]["grouped"]) if seen else "",
         "array": _array(diagnosis, rig),
-        "drawn": _drawn(diagnosis, rig, found[0] if found else None),
+        "drawn": _drawn(diagnosis, rig, (seen[0], found[0]) if found else None),
         "headline": headline(diagnosis),
         "story": story(diagnosis),
         "sentences": diagnosis.sentences[1:],
@@ -169,8 +169,8 @@ def _array(diagnosis: Diagnosis, rig: DrawnRig) -> dict[str, Any]:
     }
 
 
-def _drawn(diagnosis: Diagnosis, rig: DrawnRig, views: ResidualViews | None) -> list[tuple[str, str]]:
-    """Return the pictures of the first screen with their captions: where it is, and what it goes with."""
+def _drawn(diagnosis: Diagnosis, rig: DrawnRig, first: tuple[RunView, ResidualViews] | None) -> list[tuple[str, str]]:
+    """Return the pictures of the first screen with their captions: where it is, what it goes with, what it removes."""
     array = diagnosis.twin.array
     if not diagnosis.causes:
         return []
@@ -183,8 +183,11 @@ def _drawn(diagnosis: Diagnosis, rig: DrawnRig, views: ResidualViews | None) -> 
         assert one.function is not None
         caption = f"{one.text[0].upper()}{one.text[1:]}: the function that the data show, ±2σ."
         drawn.append((figures.function_figure(one.function, one.what), caption))
-    if views is not None and views.form is not None:
-        form = views.form
+    if first is not None:
+        caption = "Measured and predicted, by the simulation as given and extended, where it errs most."
+        drawn.append((figures.measured_figure(first[0], first[1].size), caption))
+    form = first[1].form if first is not None else None
+    if form is not None:
         caption = (
             f"What was wrong in {form.channel}: {percent(form.share)} of the square of its error goes with "
             f"{form.quantity}. The line is what the extended simulation makes of it."

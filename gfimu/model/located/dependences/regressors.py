@@ -22,6 +22,7 @@ __all__ = [
     "TEMPERATURE",
     "TIME",
     "WARMING",
+    "WITHIN_REVOLUTION",
     "Regressor",
 ]
 
@@ -53,6 +54,9 @@ class Regressor:
 RATE = Regressor("omega", "the rate", "rad/s", lambda state: state.spin.rate)
 ACCELERATION = Regressor("alpha", "the angular acceleration", "rad/s²", lambda state: state.spin.acceleration)
 ANGLE = Regressor("theta", "the angle turned", "rad", lambda state: state.spin.angle)
+WITHIN_REVOLUTION = Regressor(
+    "theta mod 2 pi", "the angle within a revolution", "rad", lambda state: np.mod(state.spin.angle, 2.0 * np.pi)
+)
 TIME = Regressor("t", "time", "s", lambda state: state.t)
 NOTHING = Regressor("1", "nothing", "", lambda state: np.ones_like(state.t))
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.model.located.dependences.dependence import Dependence
+from gfimu.model.located.dependences.regressors import WITHIN_REVOLUTION, Regressor
 from gfimu.model.located.rig_state import RigState
 from gfimu.model.located.usual import USUAL
 
@@ -44,6 +45,11 @@ class Revolution(Dependence):
     def highest_hz(self, fastest: float) -> float:
         """Return the highest frequency that it adds to a motion at rates up to ``fastest``, rad/s."""
         return self.harmonics * fastest / (2.0 * np.pi)
+
+    @property
+    def abscissa(self) -> Regressor | None:
+        """The angle within a revolution, where nothing else multiplies the function."""
+        return WITHIN_REVOLUTION if self.name == "revolution" else None
 
     @property
     def numbers(self) -> dict[str, Any]:

@@ -49,6 +49,7 @@ def drawn(views, view):
     return {
         "trace": figures.trace_figure(view, views.size),
         "channels": figures.channels_figure(view, views.size, ARRAY),
+        "measured": figures.measured_figure(view, views.size),
         "form": figures.form_figure(views.form),
         "marked": figures.marked_figure(ARRAY, *seen_from, Marked(frozenset({1}), True, True)),
         "spectrum": figures.spectrum_figure(views.spectrum),
@@ -63,6 +64,7 @@ def test_every_figure_is_well_formed_labelled_and_the_same_each_time(views, view
     labels = {
         "trace": {"measured − predicted, channel a11", "time, s", "m/s²"},
         "channels": {*CHANNELS, "time, s"},
+        "measured": {"a11, m/s²", "time, s", "measured", "as given", "extended"},
         "form": {"ω, rad/s", "a11, m/s²", "extended simulation", "measured − given simulation, ±2σ"},
         "marked": {*CHANNELS, "a1", "a2", "gravity", "axis of rotation"},
         "spectrum": {"frequency, Hz", "amplitude density, m/s²/√Hz", "before", "after", "noise"},

@@ -108,6 +108,7 @@ def test_what_has_a_place_and_no_name_is_said_first_and_drawn(pages):
     assert "Probability of the place: 88 %." in words
     assert "Not separable from this by these data: the axis tilts in the room, always." in words
     assert "the function that the data show, ±2σ" in words
+    assert "Measured and predicted, by the simulation as given and extended" in words
     assert "Where it is: the axis, with the table and its reference." in words
 
 

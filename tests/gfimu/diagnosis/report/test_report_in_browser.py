@@ -81,7 +81,7 @@ def css(colour):
 def test_plots_stand_in_place_of_the_pictures(page):
     assert page.run("document.querySelectorAll('.zooming canvas').length") == 4  # three channels, one spectrum
     assert page.run("[...document.querySelectorAll('.still')].every(one => !one.checkVisibility())")
-    assert page.run("document.querySelectorAll('figure svg').length") == 8
+    assert page.run("document.querySelectorAll('figure svg').length") == 9
     found = pixels(page)
     assert found[css(PAGE["light"]["before"])] > 200
     assert found[css(PAGE["light"]["after"])] > 200

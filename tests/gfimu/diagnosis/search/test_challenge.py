@@ -95,11 +95,18 @@ def test_a_gain_that_follows_time_is_no_random_walk_of_the_biases():
 
 
 def test_a_gain_that_follows_the_angle_has_a_mean_and_no_scale_factor_beside_it():
-    def gain(run):
-        angle = np.concatenate([[0.0], np.cumsum(np.diff(run.t_s) * run.reference["tacho_rad_s"][1:])])
+    def at(angle):
         return 2e-3 * np.exp(np.cos(2.0 * angle + 0.4))
 
-    assert only(found_in(gain=gain)) == ("supply", "gain", "revolution")
+    def gain(run):
+        return at(np.concatenate([[0.0], np.cumsum(np.diff(run.t_s) * run.reference["tacho_rad_s"][1:])]))
+
+    found = found_in(gain=gain)
+    assert only(found) == ("supply", "gain", "revolution")
+    table = found.causes[0].unlisted.function
+    x, f, std = (np.array(column) for column in (table.x, table.f, table.std))
+    assert 0.0 <= x.min() < 0.1 and 6.2 < x.max() < 6.3
+    assert np.abs(f - at(x)).max() < 4.0 * std.max() + 2e-4  # the sum of the tachometer is no exact angle
 
 
 def test_a_reference_that_drifts_goes_with_time():
