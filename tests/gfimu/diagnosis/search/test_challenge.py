@@ -105,7 +105,8 @@ def test_a_gain_that_follows_the_angle_has_a_mean_and_no_scale_factor_beside_it(
     assert only(found) == ("supply", "gain", "revolution")
     table = found.causes[0].unlisted.function
     x, f, std = (np.array(column) for column in (table.x, table.f, table.std))
-    assert 0.0 <= x.min() < 0.1 and 6.2 < x.max() < 6.3
+    assert 0.0 <= x.min() < 0.1
+    assert 6.2 < x.max() < 6.3
     assert np.abs(f - at(x)).max() < 4.0 * std.max() + 2e-4  # the sum of the tachometer is no exact angle
 
 
