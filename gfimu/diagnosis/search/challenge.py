@@ -13,7 +13,7 @@ import numpy as np
 
 from gfimu.diagnosis.data.body.stretch import BodyStretch
 from gfimu.diagnosis.data.stretch import Stretch
-from gfimu.diagnosis.fit.gauss_newton import FEW, Fit, fit
+from gfimu.diagnosis.fit.gauss_newton import FEW, Fit, fit, linearly_without
 from gfimu.diagnosis.fit.learn import learn_noise, learn_roughness
 from gfimu.diagnosis.fit.linear import Point, with_residue
 from gfimu.diagnosis.fit.random_walk import as_it_walks
@@ -87,7 +87,8 @@ def challenged(explanation: Explanation, policy: Policy, report: Report = lambda
     if whole is None:
         return explanation
     sets.without_each(whole)
-    sets.fit([replace(whole.point, causes=one.causes) for one in found.rivals[: policy.beam]])
+    rivals = [one for one in found.rivals if not one.key > found.best.key]  # that more is not needed is known
+    sets.fit([replace(whole.point, causes=one.causes) for one in rivals[: policy.beam]])
     return replace(
         explained(sets, prune(sets), explanation.fits, explanation.screening), elsewhere=explanation.elsewhere
     )
@@ -187,17 +188,18 @@ def _tried(
     stretches: Sequence[Stretch], leading: Fit, fewer: Sequence[Fit], needed: float, policy: Policy
 ) -> list[Fit]:
     """Return fits of a set with located terms, beside it or instead of some of its causes, best first."""
+    bases, linear = (leading, *fewer), [_linearly(leading, one.key, policy) for one in (leading, *fewer)]
+    missed = [policy.inexactness * (one.objective - leading.objective) for one in linear]  # by a linear world
     cases: list[tuple[Key, float]] = [(frozenset(), needed - policy.worth_a_search)]
-    for one in fewer:  # of what is large the linear world misses a share
-        missed = max(policy.close, policy.inexactness * (one.objective - leading.objective))
-        cases.append((leading.key - one.key, _gains(leading, one) - missed))
+    for one, share in zip(linear[1:], missed[1:], strict=True):
+        cases.append((leading.key - one.key, _gains(leading, one) - max(policy.close, share)))
     screen = LocatedScreen(stretches, leading.point)
     promised = []
-    for base, leaders in zip((leading, *fewer), screen.leaders_each(cases), strict=True):
+    for base, there, share, leaders in zip(bases, linear, missed, screen.leaders_each(cases), strict=True):
         shaped = [screen.refined(one, leading.key - base.key) for one in _first_of_each_shape(leaders)]
         ranked = sorted([*shaped, *leaders], key=lambda one: -one.log_odds)
         others = [one for one in _distinct(ranked) if one.cause.key not in leading.key]
-        promised += [(base.log_posterior + leader.log_odds, leader, base) for leader in others]
+        promised += [(there.log_posterior + leader.log_odds - share, leader, base) for leader in others]
     promised.sort(key=lambda one: -one[0])
     fitted: list[Fit] = []
     for _, leader, base in promised[: LOCATED.fitted]:
@@ -206,6 +208,15 @@ def _tried(
         fitted += [one for one in tried if base is leading or _says_more(one, leading, base, policy)]
     fitted.sort(key=lambda one: -one.log_posterior)
     return fitted[: LOCATED.compared]
+
+
+def _linearly(leading: Fit, key: Key, policy: Policy) -> Fit:
+    """Return what a leading fit would be with only some of its causes, in the linear world about it."""
+    found = leading
+    for cause in leading.causes:
+        if cause.key not in key:
+            found = linearly_without(found, next(one for one in found.causes if one.key == cause.key), policy)
+    return found
 
 
 def _says_more(one: Fit, leading: Fit, base: Fit, policy: Policy) -> bool:
