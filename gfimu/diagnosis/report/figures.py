@@ -45,7 +45,6 @@ _BEFORE, _AFTER = css(BEFORE_ON_PAPER), css(AFTER_ON_PAPER)
 _NOISE, _INK, _PALE = css(NOISE_ON_PAPER), css(INK), css(PALE)
 _LIMITS = PlotLimits()
 _MANY = 24  # channels, of more of which pictures are coarser so that the page stays small
-_COMPARED, _COMPARED_S = 2, 4.0  # channels, and seconds, of measured beside predicted
 _MOST_POINTS = 4000
 _MOST_FREQUENCIES = 1200
 _COARSE_DPI = 55
@@ -65,8 +64,7 @@ def trace_figure(run: RunView, size: ResidualSize) -> str:
     with mpl.rc_context(ON_PAGE):
         figure = Figure(figsize=(11.0, 3.0), layout="constrained")
         axis = figure.subplots()
-        excess = np.nan_to_num(size.before / size.floor, nan=-1.0, posinf=0.0)
-        worst = int(np.argmax(excess))
+        worst = size.furthest[0]
         _trace(axis, run, worst, size.floor[worst])
         axis.set_title(f"measured − predicted, channel {size.channels[worst]}", loc="left", fontsize=10.5)
         axis.set_ylabel("m/s²")
@@ -76,15 +74,16 @@ def trace_figure(run: RunView, size: ResidualSize) -> str:
 
 
 def measured_figure(run: RunView, size: ResidualSize) -> str:
-    """Draw the two channels that were worst as measured and as predicted, where the prediction errs most."""
+    """Draw the channels that were worst as measured and as predicted, where the prediction errs most."""
     period = float(np.median(np.diff(run.t))) if len(run.t) > 1 else 1.0
-    worst = np.argsort(-np.nan_to_num(size.before / size.floor, nan=-1.0, posinf=0.0), kind="stable")[:_COMPARED]
+    worst = size.furthest[: _LIMITS.compared]
     errors = np.where(run.valid, run.measured - run.before, 0.0)[:, worst] / size.floor[worst]  # (n, 2)
-    power = uniform_filter1d(np.nan_to_num(errors**2).sum(axis=1), max(round(_COMPARED_S / period), 1), mode="constant")
+    width = max(round(_LIMITS.compared_s / period), 1)
+    power = uniform_filter1d(np.nan_to_num(errors**2).sum(axis=1), width, mode="constant")
     middle = run.t[int(np.argmax(power))]
-    near = np.abs(run.t - middle) <= 0.5 * _COMPARED_S
+    near = np.abs(run.t - middle) <= 0.5 * _LIMITS.compared_s
     with mpl.rc_context(ON_PAGE):
-        figure = Figure(figsize=(_VIEW[0], 1.6 * len(worst)), layout="constrained")
+        figure = Figure(figsize=(_VIEW[0], _VIEW[1] * (1 + len(worst)) / 2), layout="constrained")
         axes = figure.subplots(len(worst), 1, sharex=True, squeeze=False)[:, 0]
         for channel, axis in zip(worst, axes, strict=True):
             seen = np.where(run.valid[near, channel], run.measured[near, channel], np.nan)

@@ -129,7 +129,7 @@ def _plot_rule(grouped: int) -> str:
 def _run(run: RunView, views: ResidualViews, array: AccelerometerArray) -> Mapping[str, Any]:
     """Return what the page says and draws of a run."""
     size, alive = views.size, np.asarray(run.valid.any(axis=0))
-    worst = int(np.argmax(np.nan_to_num(size.before / size.floor, nan=-1.0, posinf=0.0)))
+    worst = size.furthest[0]
     return {
         "name": run.name,
         "samples": len(run.t),

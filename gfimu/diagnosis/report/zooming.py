@@ -66,7 +66,7 @@ def residual_plot(run: RunView, size: ResidualSize, array: AccelerometerArray, d
         "grouped": group if group > 1 else 0,
         "smooth": max(round(_LIMITS.smooth_s / spacing), 1),
         "channels": channels,
-        "shown": _worst(size),
+        "shown": sorted(size.furthest[: _LIMITS.shown_first].tolist()),
         "drive": {
             "label": "speed of the carriage" if run.linear else "rate of rotation",
             "unit": "m/s" if run.linear else "rad/s",
@@ -121,12 +121,6 @@ def _with_breaks(
         return broken_at_gaps(t, values)
     envelope = enveloped(t, values[:, 0], group)
     return envelope.t, envelope.mean[:, None]
-
-
-def _worst(size: ResidualSize) -> list[int]:
-    """Return the channels that are shown first: those furthest above their noise, in the order of the array."""
-    excess = np.nan_to_num(size.before / size.floor, nan=-1.0, posinf=0.0)
-    return sorted(int(one) for one in np.argsort(-excess, kind="stable")[: _LIMITS.shown_first])
 
 
 def _largest(values: NDArray[np.float64]) -> float:

@@ -24,6 +24,8 @@ class PlotLimits:
         Length of the moving mean that is drawn over the samples, s.
     shown_first : int
         Channels that are drawn when the page opens.
+    compared, compared_s : int and float
+        Channels that are drawn as measured and as predicted, and for how long about the largest error, s.
     coloured : int
         Channels that have a colour of their own; the others are grey.
     """
@@ -33,6 +35,8 @@ class PlotLimits:
     fineness: float = 8.0
     smooth_s: float = 0.15
     shown_first: int = 3
+    compared: int = 2
+    compared_s: float = 4.0
     coloured: int = 4
 
     def group(self, samples: int) -> int:

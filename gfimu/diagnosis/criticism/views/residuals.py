@@ -32,6 +32,11 @@ class ResidualSize:
     floor: NDArray[np.float64]
     sentence: str
 
+    @property
+    def furthest(self) -> NDArray[np.intp]:
+        """The channels by how far they are above their noise, furthest first, those without data last, (c,)."""
+        return np.argsort(-np.nan_to_num(self.before / self.floor, nan=-1.0, posinf=0.0), kind="stable")
+
 
 @dataclass(frozen=True)
 class Whiteness:
