@@ -2,7 +2,7 @@
 
 The generators of `foreign_world` make them with the effects ``lot_000`` … , exact physics (moved and turned chips, late
 samples, …) with forms that are no functions of the engine's. Each half was drawn once. The first showed which terms the
-engine lacked, the second was drawn afterwards; nothing was set on that.
+engine lacked; the second was drawn afterwards, and nothing had been set on it when it was run.
 """
 
 from dataclasses import dataclass, replace

@@ -77,8 +77,18 @@ def walk_strength(stretches: Sequence[Stretch], point: Point, policy: Policy = P
     return Walk(mean, float(np.hypot(std, policy.walk_to_drive * mean)), odds, unequal)
 
 
-def as_it_walks(stretches: Sequence[Stretch], point: Point, policy: Policy = Policy()) -> Point:
-    """Return the point with biases that walk as its residual shows, or do not walk where that is not likely."""
+def as_it_walks(stretches: Sequence[Stretch], point: Point, policy: Policy) -> Point:
+    """Return a point with the random walk of the biases that its residual shows; with none where none is likely.
+
+    Parameters
+    ----------
+    stretches : sequence of Stretch
+        The data.
+    point : Point
+        A fit.
+    policy : Policy
+        Thresholds of `walk_strength` and `Walk.is_likely`.
+    """
     walk = walk_strength(stretches, point, policy)
     strength = walk.strength if walk.is_likely(policy) else 0.0
     return replace(point, levels=tuple(replace(level, walk=strength) for level in point.levels))

@@ -74,7 +74,7 @@ def trace_figure(run: RunView, size: ResidualSize) -> str:
 
 
 def measured_figure(run: RunView, size: ResidualSize) -> str:
-    """Draw the channels that were worst as measured and as predicted, where the prediction errs most."""
+    """Draw the channels furthest above their noise, measured and predicted, some seconds about the largest error."""
     period = float(np.median(np.diff(run.t))) if len(run.t) > 1 else 1.0
     worst = size.furthest[: _LIMITS.compared]
     errors = np.where(run.valid, run.measured - run.before, 0.0)[:, worst] / size.floor[worst]  # (n, 2)

@@ -77,8 +77,7 @@ def challenged(explanation: Explanation, policy: Policy, report: Report = lambda
         ]
         rivals = sorted((*explanation.rivals, *others), key=lambda one: -one.log_posterior)
         return replace(explanation, rivals=tuple(rivals))
-    walk = found.best.point.levels[0].walk
-    levels = tuple(replace(level, walk=walk) for level in best.point.levels)
+    levels = tuple(replace(level, walk=found.best.point.levels[0].walk) for level in best.point.levels)
     point = replace(best.point, causes=found.best.causes, levels=levels)
     if best.point.residue is not None:
         point = with_residue(stretches, point, best.point.residue.scale)
@@ -87,7 +86,7 @@ def challenged(explanation: Explanation, policy: Policy, report: Report = lambda
     if whole is None:
         return explanation
     sets.without_each(whole)
-    rivals = [one for one in found.rivals if not one.key > found.best.key]  # that more is not needed is known
+    rivals = [one for one in found.rivals if not one.key > found.best.key]  # the search has refused what these add
     sets.fit([replace(whole.point, causes=one.causes) for one in rivals[: policy.beam]])
     return replace(
         explained(sets, prune(sets), explanation.fits, explanation.screening), elsewhere=explanation.elsewhere
@@ -188,8 +187,10 @@ def _tried(
     stretches: Sequence[Stretch], leading: Fit, fewer: Sequence[Fit], needed: float, policy: Policy
 ) -> list[Fit]:
     """Return fits of a set with located terms, beside it or instead of some of its causes, best first."""
-    bases, linear = (leading, *fewer), [_linearly(leading, one.key, policy) for one in (leading, *fewer)]
-    missed = [policy.inexactness * (one.objective - leading.objective) for one in linear]  # by a linear world
+    bases = (leading, *fewer)
+    # The odds of a screen are of the linear world about the leading set, so that of a smaller set counts there too.
+    linear = [_linearly(leading, one.key, policy) for one in bases]
+    missed = [policy.inexactness * (one.objective - leading.objective) for one in linear]
     cases: list[tuple[Key, float]] = [(frozenset(), needed - policy.worth_a_search)]
     for one, share in zip(linear[1:], missed[1:], strict=True):
         cases.append((leading.key - one.key, _gains(leading, one) - max(policy.close, share)))
@@ -252,7 +253,7 @@ def _refined(stretches: Sequence[Stretch], found: Fit, policy: Policy) -> Fit:
 
 
 def _settled(stretches: Sequence[Stretch], found: Fit, policy: Policy) -> Fit:
-    """Return a fit under the roughness and the noise that it leaves; what walked may be what it describes."""
+    """Return a fit under the roughness and the noise that it leaves, a random walk of the biases learnt anew too."""
     point = learn_roughness(stretches, found.point)
     if point.levels[0].walk > 0.0 and stretches[0].first_levels.walk == 0.0:
         point = as_it_walks(stretches, point, policy)

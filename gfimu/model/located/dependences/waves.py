@@ -32,7 +32,7 @@ ENVELOPES: dict[str, Callable[[_Floats], _Floats]] = {
 class Revolution(Dependence):
     """A function of the angle within a revolution, by harmonics, times what its name says of rate over ``scale``.
 
-    With ``mean``, its mean is a coefficient too, the last; of some length scales the prior keeps that at zero.
+    With ``mean`` the last coefficient is the mean over a revolution, which half of the priors that are tried leave out.
     """
 
     name: str
@@ -60,8 +60,11 @@ class Revolution(Dependence):
     def roots(self) -> tuple[_Floats, ...]:
         """Roots of the prior covariance, one for each length scale, without a mean and with one."""
         order: _Floats = np.repeat(np.arange(1.0, self.harmonics + 1), 2)
-        every = [np.diag(np.append(one, self.mean)) for one in (1.0 / np.sqrt(order), 1.0 / order**2)]
-        return (*(one[:, :-1] for one in every), *every) if self.mean else tuple(one[:-1, :-1] for one in every)
+        falling = (1.0 / np.sqrt(order), 1.0 / order**2)
+        if not self.mean:
+            return tuple(np.diag(one) for one in falling)
+        whole = tuple(np.diag(np.append(one, 1.0)) for one in falling)
+        return (*(one[:, :-1] for one in whole), *whole)
 
     def values(self, state: RigState) -> _Floats:
         """Return the functions at the samples."""
