@@ -18,9 +18,9 @@ from gfimu.budget.drift import ErrorSources, drift_budget, equivalent_rate_drift
 from gfimu.motion.estimate import Estimate
 from gfimu.motion.rest_bias import estimate_from_rest, rest_bias
 from gfimu.rate.bounds.sample import alpha_std, rate_bound_isotropic, steady_rate_bound
-from gfimu.rate.kalman import FilterSettings
 from gfimu.rate.methods import RATE_METHODS, estimate_rate
 from gfimu.rate.sensing import SensorErrors
+from gfimu.rate.settings import FilterSettings
 from gfimu.recording import Recording
 from sim.scenarios import Scenario
 from sim.simulation import simulate

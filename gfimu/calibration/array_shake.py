@@ -26,7 +26,6 @@ from gfimu.calibration.result import Calibration
 from gfimu.calibration.shake_equations import BorderedBand, RateSpline, Solved
 from gfimu.calibration.shake_scale import scale_from_band
 from gfimu.calibration.shake_start import Shake, shakes, signed_rate
-from gfimu.rate.sensing import SensorErrors
 from gfimu.recording import Recording
 from gfimu.recording.rest import Rest
 
@@ -416,11 +415,10 @@ def _scaled(
     size = float(np.linalg.norm(data.array.chip_positions - data.array.chip_positions.mean(axis=0)))
     arms = _of_size(state.positions, size)  # the drawing's size, to start with
     fitted = data.array.with_geometry(centre + arms, [chip.axes for chip in data.array.chips])
-    errors = SensorErrors.uniform(data.array, data.start_noise)
     parts = []
     for shake in found:
         readings = shake.readings - state.biases
-        rate = signed_rate(fitted, shake.t_s, readings, errors, shake.still)
+        rate = signed_rate(fitted, shake.t_s, readings, np.full(data.array.n_channels, data.start_noise), shake.still)
         parts.append((shake.t_s, turning_readings(readings, fitted, rate), CubicSpline(shake.t_s, rate)(shake.t_s, 1)))
     scale, std = scale_from_band(parts)
     rest = np.zeros(len(covariance) - 3 * k)

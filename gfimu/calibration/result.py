@@ -264,6 +264,24 @@ class Calibration(Declared, PlottedResult):
                 stds[f"{chip}{number}"] = math.hypot(math.sqrt(max(float(variance), 0.0)), TURN_ON_STD_M_S2)
         return stds
 
+    @property
+    def gain_std(self) -> dict[str, float | str]:
+        """Standard deviations of what the correction leaves, over the channels: gains, axes, rad, and positions, m.
+
+        ``turned`` says which directions the data left open: of ``each`` chip, of ``all`` together, or ``none``.
+        """
+        std, values = self.std, np.abs(self.values)
+        turned = "each" if self.gauge in ("x_axis", "z_axis") else "all" if self.null_space.shape[1] else "none"
+        found: dict[str, float | str] = {"turned": turned}
+        sizes = [value for name, value in zip(self.names, values, strict=True) if KINDS["sensitivity"](name)]
+        size = float(np.mean(sizes)) if sizes else 1.0
+        kinds = {"scale": "sensitivity", "axis_rad": "cross-axis sensitivity", "placement_m": "position"}
+        for key, kind in kinds.items():
+            stds = [one for name, one in zip(self.names, std, strict=True) if KINDS[kind](name)]
+            rms = float(np.sqrt(np.mean(np.square(stds)))) if stds else 0.0
+            found[key] = rms if kind == "position" else rms / size
+        return found
+
     def value(self, name: str) -> float:
         """Value of a parameter by name; raises `InputError` that lists the names."""
         return float(self.values[self._index(name)])
@@ -339,9 +357,10 @@ class Calibration(Declared, PlottedResult):
             columns = [recording.channels.index(f"{chip}{axis}") for axis in (1, 2, 3)]
             readings[:, columns] = (model.read if forward else model.correct)(readings[:, columns])
         metadata = dict(recording.metadata) | {"calibration": self.method if not forward else "inverted"}
-        metadata.pop("bias_std_m_s2", None)
+        for key in ("bias_std_m_s2", "calibration_std"):
+            metadata.pop(key, None)
         if not forward:
-            metadata["bias_std_m_s2"] = self.bias_std
+            metadata |= {"bias_std_m_s2": self.bias_std, "calibration_std": self.gain_std}
         if target == "m_s2":
             metadata.pop("lsb_m_s2", None)
         return replace(recording, readings=readings, unit=target, metadata=metadata)

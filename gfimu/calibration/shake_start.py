@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from gfimu.array.array import AccelerometerArray
 from gfimu.base.errors import InputError
 from gfimu.calibration.array_motion import turning_readings
-from gfimu.rate.maximum_likelihood import maximum_likelihood_rate
-from gfimu.rate.sensing import SensorErrors
+from gfimu.rate.channel_sets import ChannelSets
+from gfimu.rate.maximum_likelihood import rates_of_null_space
 from gfimu.recording import Recording
 from gfimu.recording.rest import Rest
 
@@ -66,7 +66,6 @@ def shakes(recording: Recording, array: AccelerometerArray, rest: Rest, noise: F
     InputError
         If no stretch between rests turns faster than 2 rad/s for half a second.
     """
-    errors = SensorErrors.uniform(array, noise)
     n, kept = len(recording), max(round(_REST_KEPT_S * recording.sample_rate), 3)
     edges = np.concatenate([[0], np.column_stack([rest.start, rest.stop]).ravel(), [n]])
     found = []
@@ -79,7 +78,7 @@ def shakes(recording: Recording, array: AccelerometerArray, rest: Rest, noise: F
         readings, t = readings[good], t[good]
         place = np.arange(first, last)[good]
         still = (place < before) | (place >= after)
-        rate = signed_rate(array, t, readings, errors, still)
+        rate = signed_rate(array, t, readings, noise, still)
         moving = np.linalg.norm(rate, axis=1) > _SLOWEST
         if _turning(readings, array, noise)[~still].mean() < 0.5 or moving.sum() < _SHORTEST_S * recording.sample_rate:
             continue
@@ -93,10 +92,11 @@ def shakes(recording: Recording, array: AccelerometerArray, rest: Rest, noise: F
 
 
 def signed_rate(
-    array: AccelerometerArray, t: Floats, readings: Floats, errors: SensorErrors, still: NDArray[np.bool_]
+    array: AccelerometerArray, t: Floats, readings: Floats, noise: Floats, still: NDArray[np.bool_]
 ) -> Floats:
     """Rate of every sample by maximum likelihood, (n, 3), rad/s, with the signs that α ties together."""
-    rate = np.nan_to_num(maximum_likelihood_rate(array, t, readings, errors, start_at_rest=False).omega)
+    full = ChannelSets(array, np.broadcast_to(noise, array.n_channels).astype(float)).full
+    rate = np.nan_to_num(rates_of_null_space(readings @ full.product_rows.T, full.sensitivity)[0])
     rate[still] = 0.0
     return _with_signs(rate, readings, t, array)
 

@@ -6,7 +6,7 @@ gfimu estimate run.parquet --method filter --rest-bias --out estimate.parquet
 # One chip on a table
 gfimu estimate run.csv --array arm.toml --axis z --out estimate.csv
 # Two chips on a wheel
-gfimu estimate run.csv --array wheel.toml --axis z --hub free --unknown-start --out est.csv
+gfimu estimate run.csv --array wheel.toml --axis z --hub free --out est.csv
 # Mounted by eye
 gfimu estimate run.csv --array arm.toml --axis z --lever-std-m 0.003 --rotation-std-rad 0.05 \
     --bias-std-m-s2 0.3 --out est.csv
@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
-from gfimu.base.errors import InputError, naming
+from gfimu.base.errors import InputError, check_name, naming
 from gfimu.commands import given
 from gfimu.commands.known_axis import AXIS, AxisLike, as_known_axis
 from gfimu.commands.shell import options
@@ -38,7 +38,7 @@ _FILTERED = " (filter, smoother)"
 _METHOD = Option(f"Angular rate by: {', '.join(RATE_METHODS)}.", "METHOD", offers=tuple(RATE_METHODS))
 _FORMS = ("auto", "linear", "joint", "recursive")
 _FORM = Option("How readings turn into p and α: auto, linear, joint or recursive.", "FORM", offers=_FORMS)
-_OMEGA = Option("Angular rate at the first sample (3,), body axes, rad/s; at rest by default.", shell=False)
+_OMEGA = Option("Angular rate at the first sample (3,), body axes, rad/s, where it is known.", shell=False)
 _QUATERNION = Option(
     "Attitude (w, x, y, z) at the first sample; by default the recording's mounting, or the one that levels the mean "
     "of p over the first second.",
@@ -132,7 +132,7 @@ def estimate(
     form: Annotated[str, _FORM] = "auto",
     rest_bias: Annotated[bool, Option("Read the biases off the first rest (table level) and take them off.")] = False,
     calibration: given.CalibrationToApply = None,
-    unknown_start: Annotated[bool, options.UNKNOWN_START.also(_FILTERED)] = False,
+    start: Annotated[str, options.START] = "any",
     gyro: Annotated[bool, options.GYRO.also(_FILTERED)] = False,
     position: Annotated[bool, Option("Integrate to velocity and position too.")] = False,
     place: Annotated[Place, _PLACE] = Place(),
@@ -142,7 +142,7 @@ def estimate(
     column_map: given.Map = None,
     max_memory: given.Memory = None,
     axis: Annotated[AxisLike, AXIS] = None,
-    omega0: Annotated["ArrayLike", _OMEGA] = (0.0, 0.0, 0.0),
+    omega0: Annotated["ArrayLike | None", _OMEGA] = None,
     quaternion0: Annotated["ArrayLike | None", _QUATERNION] = None,
     noise_std: Annotated["ArrayLike | None", _NOISE] = None,
     progress: Annotated[Callable[[float], object] | None, options.SHARE] = None,
@@ -182,7 +182,8 @@ def estimate(
         warn_of_other_array(run.metadata, geometry, "the recording", whose="the given")
     run = reference_on_rows(run)
     about = as_known_axis(axis).of(geometry)
-    start = None if unknown_start else omega0
+    check_name("start", start, options.STARTS)
+    omega0 = (0.0, 0.0, 0.0) if start == "rest" and omega0 is None else omega0
     if about is None:
         require_motions_of_samples(geometry, run)
         there = place.of(run)
@@ -193,7 +194,7 @@ def estimate(
                 geometry,
                 method=method,
                 form=form,
-                omega0=start,
+                omega0=omega0,
                 quaternion0=quaternion0,
                 noise_std=noise_std,
                 with_position=position,
@@ -221,7 +222,7 @@ def estimate(
                 read_off(alive, geometry).remove(alive) if rest_bias else alive,
                 geometry,
                 about,
-                at_rest=start is not None,
+                at_rest=True if start == "rest" else None,
                 smooth=rate_method(method).uses_later_samples,
                 noise_std=noise_std,
             )

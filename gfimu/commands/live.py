@@ -10,18 +10,19 @@ gfimu live --from run.parquet --follow
 # From another machine
 ssh pi cat /data/run.csv | gfimu live --array cube12 --rate 100
 # A wheel by two chips
-gfimu live --from socket://pi:4000 --array wheel.toml --axis z --hub free --unknown-start
+gfimu live --from socket://pi:4000 --array wheel.toml --axis z --hub free
 """
 
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
-from gfimu.base.errors import InputError
+from gfimu.base.errors import InputError, check_name
 from gfimu.commands import given
 from gfimu.commands.known_axis import AXIS_ALONE, AxisLike, as_known_axis
 from gfimu.commands.shell.declare import Option, command
-from gfimu.commands.shell.options import ARRAY, BIAS_STD_M_S2, FORCE, GYRO, KEEP_FAULTY, RATE, UNKNOWN_START
+from gfimu.commands.shell.options import ARRAY, BIAS_STD_M_S2, FORCE, GYRO, KEEP_FAULTY, RATE, START, STARTS
 
 __all__ = ["live"]
 
@@ -57,7 +58,7 @@ def live(
     follow: Annotated[bool, Option("With a recording: go on reading while gfimu record writes it.")] = False,
     scale_std: Annotated[float, Option("Uncertainty of the scale factors, a ratio (0.01 is 1 %).")] = 0.0,
     bias_std_m_s2: Annotated[float | None, BIAS_STD_M_S2.also("; else the data sheets'")] = None,
-    unknown_start: Annotated[bool, UNKNOWN_START] = False,
+    start: Annotated[str, START] = "any",
     gyro: Annotated[bool, GYRO] = False,
     axis: Annotated[AxisLike, AXIS_ALONE] = None,
     keep_faulty: Annotated[bool, KEEP_FAULTY] = False,
@@ -90,13 +91,14 @@ def live(
     """
     from gfimu.commands.opened import as_array
     from gfimu.rate.health.live.watched_filter import WatchedRateFilter
-    from gfimu.rate.kalman import FilterSettings
     from gfimu.rate.live import LiveRateFilter
-    from gfimu.rate.sensing import SensorErrors, calibrated_bias_std
+    from gfimu.rate.sensing import SensorErrors
+    from gfimu.rate.settings import FilterSettings
     from gfimu.rate.stream import examined_lines, filter_stream, read_head
     from gfimu.recording.carried_array import carried_array
     from gfimu.recording.lines import source_lines
 
+    check_name("start", start, STARTS)
     metadata, lines = read_head(source_lines(source, max_memory, follow=follow))
     geometry = carried_array(metadata, source="the stream") if array is None else as_array(array)
     if geometry is None:
@@ -114,14 +116,15 @@ def live(
 
         if gyro or scale_std or bias_std_m_s2 is not None:
             raise InputError("--gyro, --scale-std and --bias-std-m-s2 have no use with a known axis; leave them out")
-        return axis_stream(lines, geometry, about, rate, at_rest=not unknown_start)
-    bias = calibrated_bias_std(metadata, geometry) if bias_std_m_s2 is None else bias_std_m_s2
-    biases: dict[str, Any] = {} if bias is None else {"bias_std": bias}
-    errors = SensorErrors.from_parts(geometry, rate, scale_std=scale_std, **biases)
-    settings = FilterSettings(start_omega=None) if unknown_start else FilterSettings()
+        return axis_stream(lines, geometry, about, rate, at_rest=True if start == "rest" else None)
+    biases: dict[str, Any] = {} if bias_std_m_s2 is None else {"bias_std": bias_std_m_s2}
+    errors = SensorErrors.of_recording(geometry, metadata, rate, **biases)
+    if scale_std:
+        errors = replace(errors, scale_std=scale_std)
+    settings = FilterSettings.starting(start)
     watched = None
     if not keep_faulty:
         is_sure = scale_std > 0.0 or "calibration" in metadata
         live = LiveRateFilter(geometry, errors, 1.0 / rate, settings, gyro=gyro)
-        watched = WatchedRateFilter.of(live, errors, calibrated=is_sure, at_rest=not unknown_start)
+        watched = WatchedRateFilter.of(live, errors, calibrated=is_sure)
     return filter_stream(lines, geometry, errors, 1.0 / rate, settings, fuse_gyro=gyro, watched=watched)

@@ -19,6 +19,7 @@ from gfimu.rate.axis.accuracy.bounds import require_visible
 from gfimu.rate.axis.fit import fit_axis
 from gfimu.rate.axis.problem import AxisProblem
 from gfimu.rate.axis.recursion import smooth_axis
+from gfimu.rate.rest_test import begins_still
 from gfimu.recording import Recording
 from gfimu.recording.carried_array import array_metadata
 from gfimu.recording.clipping import without_clipped
@@ -34,7 +35,7 @@ def estimate_about_axis(
     array: AccelerometerArray,
     axis: TurningAxis,
     *,
-    at_rest: bool = True,
+    at_rest: bool | None = None,
     smooth: bool = False,
     noise_std: ArrayLike | None = None,
 ) -> Estimate:
@@ -49,7 +50,8 @@ def estimate_about_axis(
     axis : TurningAxis
         The axis, and whether it stands still or moves with a body.
     at_rest : bool
-        Whether the body is at rest at the first sample; else the start is searched, and the sign of the rate with it.
+        Whether the body is at rest at the first sample, else the start is searched, and the sign of the rate with it;
+        by default whether the readings of the first half second are still.
     smooth : bool
         Whether later samples are used for earlier ones (Rauch, Tung and Striebel).
     noise_std : array_like, scalar or shape (c,), optional
@@ -75,6 +77,8 @@ def estimate_about_axis(
     t, y = recording.t_s, np.ascontiguousarray(recording.for_array(array))
     noise = white_noise_std(array, recording.sample_rate) if noise_std is None else np.asarray(noise_std, dtype=float)
     noise = np.ascontiguousarray(np.broadcast_to(noise, array.n_channels))
+    if at_rest is None:
+        at_rest = begins_still(y, noise, 1.0 / recording.sample_rate)
     fit = fit_axis(t, y, array, axis, noise, at_rest=at_rest)
     one, channels, mounted = fit.settings, fit.channels, fit.mounting
     slopes = None if mounted is None else mounted.mounting.slopes(mounted.values)

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from gfimu.array.array import AccelerometerArray
 from gfimu.base.short_repr import short_repr
 from gfimu.rate.health.fault import ChannelFault, ChannelHealth, HealthCode
+from gfimu.rate.reduction import stuck_readings
 from gfimu.rate.sensing import SensorErrors, step_of_readings
 
-__all__ = ["UsedReadings", "stuck_readings", "watched_readings"]
+__all__ = ["UsedReadings", "watched_readings"]
 
 
 @dataclass(frozen=True)
@@ -124,22 +125,11 @@ def watched_readings(
 
         if not calibrated:
             errors = errors.with_part_gains(array)
-        if omega0 is not None and not omega0.any():
+        if omega0 is None or not omega0.any():
             health = watch_from_rest(array, used.t_s, readings, errors)
         health = health or watch_in_motion(array, used.t_s, readings, errors, omega0=omega0)
     stuck = stuck_readings(readings, errors.stuck_after)
     return replace(used, stuck=stuck, stuck_after=errors.stuck_after, watch=health)
-
-
-def stuck_readings(readings: NDArray[np.float64], after: int) -> NDArray[np.bool_]:
-    """Mark readings (n, c) from the ``after``-th equal one in a row on; none where ``after`` is 0."""
-    if after < 2:
-        return np.zeros(readings.shape, dtype=np.bool_)
-    rows = np.arange(len(readings))[:, None]
-    new = np.ones(readings.shape, dtype=np.bool_)
-    new[1:] = readings[1:] != readings[:-1]  # NaN differs from all
-    first = np.maximum.accumulate(np.where(new, rows, 0), axis=0)  # (n, c), row of the first equal reading
-    return np.asarray(rows - first + 1 >= after)
 
 
 def _stuck_fault(name: str, onset: float, found: float, end: float) -> ChannelFault:

@@ -51,8 +51,8 @@ class Estimate(PlottedResult):
     alpha : ndarray, shape (n, 3)
         Angular acceleration, body axes, rad/s².
     omega, omega_std : ndarray, shape (n, 3)
-        Angular rate and its standard deviation by the channels' white noise, enlarged where they disagree by more
-        (`gfimu.rate.disagreement`), body axes, rad/s.
+        Angular rate and its standard deviation, body axes, rad/s: by noise as measured, biases, and errors of gains,
+        axes and mounting as a calibration or the data sheets state them; enlarged where the channels disagree by more.
     quaternion : ndarray, shape (n, 4)
         Attitude (w, x, y, z), body to world.
     angle : ndarray, shape (n,)

@@ -28,7 +28,7 @@ from gfimu.motion.navigation import level, navigate
 from gfimu.motion.rest_navigation import navigate_with_rest
 from gfimu.rate.problem import RateProblem
 from gfimu.rate.registry import rate_method
-from gfimu.rate.sensing import calibrated_bias_std
+from gfimu.rate.sensing import SensorErrors, calibrated_bias_std, step_of_readings
 from gfimu.rate.solve import solve_rate
 from gfimu.recording import Recording
 from gfimu.recording.carried_array import array_metadata
@@ -47,7 +47,7 @@ def estimate(
     *,
     method: str = "integrate",
     form: str = "auto",
-    omega0: ArrayLike | None = (0.0, 0.0, 0.0),
+    omega0: ArrayLike | None = None,
     quaternion0: ArrayLike | None = None,
     noise_std: ArrayLike | None = None,
     with_position: bool = False,
@@ -72,7 +72,8 @@ def estimate(
     form : {"auto", "linear", "joint", "recursive"}
         How readings turn into α and p; see `gfimu.array.linear_solution`.
     omega0 : array_like, shape (3,), or None
-        Angular rate at the first sample, body axes, rad/s; None if it isn't known (``filter`` and ``smoother`` only).
+        Angular rate at the first sample, body axes, rad/s, zeros for rest. By default it is inferred from the first
+        readings; ``integrate`` starts at rest.
     quaternion0 : array_like, shape (4,), optional
         Attitude (w, x, y, z) at the first sample. By default the recording's mounting, or without one the attitude
         that levels the mean of p over the first second, with heading zero; good if the origin is not accelerated then.
@@ -121,8 +122,6 @@ def estimate(
     readings = recording.for_array(array)
     saturated = np.isnan(readings) & ~missing
     rate0 = None if omega0 is None else np.asarray(omega0, dtype=float)
-    if rate0 is None:
-        chosen.refuse_unknown_start()
     if fuse_gyro:
         chosen.refuse_gyro()
     if keep_faulty:
@@ -145,10 +144,16 @@ def estimate(
 
     gyro = _gyro(recording) if fuse_gyro else None
     temperature = recording.reference.get("temperature_degC")
-    bias = calibrated_bias_std(recording.metadata, array)
-    problem = RateProblem(array, recording.t_s, readings, noise, bias, linear, rate0, gyro, temperature, progress)
+    errors = SensorErrors.of_recording(
+        array, recording.metadata, recording.sample_rate, step=step_of_readings(readings), noise_std=noise
+    )
+    problem = RateProblem(
+        array, recording.t_s, readings, errors, calibrated_bias_std(recording.metadata, array) is not None,
+        linear, rate0, gyro, temperature, progress,
+    )  # fmt: skip
     dead = [name for finding in found if finding.kind == "dead" for name in finding.channels]
-    if earth is not None and rate0 is not None and not rate0.any():  # at rest a body turns with the Earth
+    at_rest = chosen.open_loop if rate0 is None else not rate0.any()
+    if earth is not None and at_rest:  # at rest a body turns with the Earth
         first = _initial_attitude(recording, linear.motion, np.zeros((len(readings), 3)), quaternion0)
         problem = replace(problem, omega0=earth.in_body(first))
     try:

@@ -70,7 +70,7 @@ def navigate_with_rest(
     for index, (start, stop) in enumerate(stretches):
         _level_from(force, attitude, int(start), int(stop), gravity)
         until = stretches[index + 1][0] if index + 1 < len(stretches) else len(times)
-        seen = np.isfinite(force[start:stop]).all(axis=1)
+        seen = _seen(force[start:stop], attitude[start:stop])
         if seen.any():
             up = to_rotation(attitude[start:stop][seen]).inv().apply([0.0, 0.0, gravity])
             force[start:until] -= np.mean(force[start:stop][seen] - up, axis=0)
@@ -86,11 +86,16 @@ def navigate_with_rest(
     return NavigationResult(times, attitude, velocity, position)
 
 
+def _seen(force: NDArray[np.float64], attitude: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Mark the samples (n,) whose specific force (n, 3) and attitude (n, 4) are both known."""
+    return np.asarray(np.isfinite(np.hstack([force, attitude])).all(axis=1), dtype=np.bool_)
+
+
 def _level_from(
     force: NDArray[np.float64], attitude: NDArray[np.float64], start: int, stop: int, gravity: float
 ) -> None:
     """Turn the attitude from ``start`` on so that the mean specific force of the rest points up; in place."""
-    seen = np.isfinite(force[start:stop]).all(axis=1) & np.isfinite(attitude[start:stop]).all(axis=1)
+    seen = _seen(force[start:stop], attitude[start:stop])
     if not seen.any():
         return
     mean = to_rotation(attitude[start:stop][seen]).apply(force[start:stop][seen]).mean(axis=0)

@@ -19,14 +19,16 @@ if TYPE_CHECKING:
         rate_information,
         steady_rate_bound,
     )
-    from gfimu.rate.disagreement import MeasuredNoise
+    from gfimu.rate.channel_errors import ChannelErrors, features_of
+    from gfimu.rate.channel_sets import ChannelSets
     from gfimu.rate.feedback import integrate_rate_recursively
-    from gfimu.rate.filter import filter_rate
+    from gfimu.rate.filter import filter_rate, smooth_rate
     from gfimu.rate.health.fault import HealthCode
-    from gfimu.rate.kalman import FilterSettings
     from gfimu.rate.rest_test import RestTest, constant_readings
+    from gfimu.rate.result import joined_estimates
     from gfimu.rate.sensing import ChannelTables
-    from gfimu.rate.smoother import smooth_rate
+    from gfimu.rate.settings import FilterSettings
+    from gfimu.rate.start import start_of_still
     from gfimu.rate.stream import filter_stream
 else:
     __getattr__, __dir__, __all__ = declared_names(__name__)

@@ -11,15 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gfimu.array.array import AccelerometerArray
-from gfimu.rate.null_readings import null_readings
-from gfimu.rate.per_sample import KnownStart, per_sample_estimate
-from gfimu.rate.result import RateEstimate
-from gfimu.rate.sensing import SensorErrors
-
-__all__ = ["algebraic_rate", "rate_from_products"]
-
-_SLOW_FIT = 4.0  # at rest the closed form leaves 7 % more residual than the best fit: 4.66 squares in simulation
+__all__ = ["rate_from_products"]
 
 
 def rate_from_products(products: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -56,49 +48,3 @@ def rate_from_products(products: ArrayLike) -> tuple[NDArray[np.float64], NDArra
     omega = speed[:, None] * direction
     omega[~np.isfinite(s).all(axis=1)] = np.nan
     return omega, slope
-
-
-def algebraic_rate(
-    array: AccelerometerArray,
-    t: ArrayLike,
-    readings: ArrayLike,
-    errors: SensorErrors,
-    *,
-    start_at_rest: bool = True,
-    start: KnownStart | None = None,
-) -> RateEstimate:
-    """Estimate the rate of each sample by the tensor method.
-
-    Parameters
-    ----------
-    array : AccelerometerArray
-        An array whose null space sees all six products of ω.
-    t : array_like, shape (n,)
-        Sample times, s.
-    readings : array_like, shape (n, c)
-        Specific force, m/s².
-    errors : SensorErrors
-        Noise of the channels, and their range.
-    start_at_rest : bool
-        Whether constant readings at the start are rest, whose mean is removed as bias.
-    start : KnownStart, optional
-        Rate at the first sample, where the run starts turning at a known rate.
-
-    Returns
-    -------
-    RateEstimate
-        Sign, ``nis`` and covariance as those of `gfimu.rate.maximum_likelihood`.
-
-    Raises
-    ------
-    GeometryError
-        If the array sees fewer products.
-    """
-    null = null_readings(array, t, readings, errors, least_rank=6, start_at_rest=start_at_rest)
-    inverse = np.linalg.pinv(null.sensitivity)  # (6, d): z has unit noise
-    products = null.z @ inverse.T
-    omega, slope = rate_from_products(products)
-    with np.errstate(invalid="ignore"):
-        covariance = slope @ (inverse @ inverse.T) @ np.swapaxes(slope, 1, 2)
-    covariance[~np.isfinite(covariance).all(axis=(1, 2))] = np.diag([np.inf] * 3)
-    return per_sample_estimate("algebraic", null, omega, covariance, array, errors, start, slow_fit=_SLOW_FIT)

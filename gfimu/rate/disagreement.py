@@ -20,7 +20,7 @@ sample would not have shown.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
@@ -29,9 +29,8 @@ from scipy.special import ndtri
 
 from gfimu.base.compiled import compiled
 from gfimu.base.declared import Declared, figure
-from gfimu.base.short_repr import short_repr
 
-__all__ = ["Disagreement", "MeasuredNoise", "ScaleSoFar", "lasting_scale", "measured_scale", "sum_up_disagreement"]
+__all__ = ["Disagreement", "measured_scale", "sum_up_disagreement"]
 
 
 _MEMORIES = 8.0  # numerical: of the longer memory, beyond which samples count for nothing
@@ -83,7 +82,6 @@ def measured_scale(
     freedom: NDArray[np.float64],
     period: float,
     *,
-    causal: bool = False,
     policy: DisagreementPolicy = POLICY,
 ) -> NDArray[np.float64]:
     """Return s̃ of each sample, shape (n,), by which standard deviations are to be multiplied: 1 or more.
@@ -96,8 +94,6 @@ def measured_scale(
         Its degrees of freedom ν, not necessarily whole numbers.
     period : float
         Sample period, s.
-    causal : bool
-        Whether later samples stay out of account.
     policy : DisagreementPolicy, optional
         Memory and significance.
 
@@ -111,78 +107,17 @@ def measured_scale(
     counts = np.where(used, freedom, 0.0).astype(float)
     kept = np.exp(-1.0 / policy.memory), np.exp(-period / policy.long_memory_s)
     deviates = -float(ndtri(policy.false_alarm)), -float(ndtri(policy.long_false_alarm))
-    return _scale(sums, counts, *kept, policy.prior, *deviates, causal)
-
-
-def lasting_scale(
-    squares: NDArray[np.float64], freedom: NDArray[np.float64], period: float, *, causal: bool = False
-) -> NDArray[np.float64]:
-    """Return s̃ of each sample by the mean over about a second around it alone, shape (n,); as `measured_scale`."""
-    smooth = replace(POLICY, prior=_ALONE, memory=POLICY.long_memory_s / period, false_alarm=POLICY.long_false_alarm)
-    return measured_scale(squares, freedom, period, causal=causal, policy=smooth)
-
-
-class ScaleSoFar:
-    """s̃ of each sample while samples arrive, from those so far (`measured_scale`, `lasting_scale`).
-
-    Parameters
-    ----------
-    period : float
-        Sample period, s.
-    lasting : bool
-        Whether s̃ is the mean over about a second alone.
-    """
-
-    def __init__(self, period: float, *, lasting: bool) -> None:
-        self._period = period
-        self._scale = lasting_scale if lasting else measured_scale
-        self._kept = round(_MEMORIES * POLICY.long_memory_s / period)
-        self._squares, self._freedom = np.zeros(0), np.zeros(0)
-
-    def push(self, squares: NDArray[np.float64], freedom: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return s̃ (n,) of further samples, by sums of squares (n,) and degrees of freedom (n,)."""
-        self._squares = np.concatenate([self._squares[-self._kept :], squares])
-        self._freedom = np.concatenate([self._freedom[-self._kept :], freedom])
-        found = self._scale(self._squares, self._freedom, self._period, causal=True)
-        return found[len(found) - len(squares) :]
-
-
-@dataclass(frozen=True)
-class MeasuredNoise:
-    """Noise of a recording as measured.
-
-    Parameters
-    ----------
-    t_s : ndarray, shape (n,)
-        Sample times, s.
-    scale : ndarray, shape (n,)
-        Its standard deviation over the stated one, 1 or more.
-    """
-
-    t_s: NDArray[np.float64]
-    scale: NDArray[np.float64]
-
-    __repr__ = short_repr
-
-    @classmethod
-    def as_stated(cls, t_s: NDArray[np.float64]) -> MeasuredNoise:
-        """Noise as stated at the samples of times ``t_s`` (n,), s, so that none is measured."""
-        return cls(t_s, np.ones(len(t_s)))
-
-    def excess(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the variance over the stated one, less 1, at the samples of times ``t`` (m,), s."""
-        place = np.minimum(np.searchsorted(self.t_s, t), len(self.t_s) - 1)
-        return np.asarray(self.scale[place] ** 2 - 1.0)
+    return _scale(sums, counts, *kept, policy.prior, *deviates)
 
 
 @compiled
-def _scale(sums, counts, keep, keep_long, prior, deviate, deviate_long, causal):  # type: ignore[no-untyped-def]
+def _scale(sums, counts, keep, keep_long, prior, deviate, deviate_long):  # type: ignore[no-untyped-def]
     """Scale of each sample from sums of squares (n,) and degrees of freedom (n,)."""
     n = len(sums)
     # Weighted sums of squares and degrees of freedom, and of the other samples' with squared weights.
     near = np.zeros((n, 3))
     far = np.zeros((n, 3))
-    for direction in range(1 if causal else 2):
+    for direction in range(2):
         near_square, near_count, near_spread = 0.0, 0.0, 0.0
         far_square, far_count, far_spread = 0.0, 0.0, 0.0
         for i in range(n):

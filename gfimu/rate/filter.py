@@ -1,4 +1,4 @@
-"""Rate filter over a whole recording: the causal estimate."""
+"""Rate filter and smoother over a whole recording."""
 
 from __future__ import annotations
 
@@ -10,13 +10,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from gfimu.array.array import AccelerometerArray
 from gfimu.base.errors import GeometryError, InputError
-from gfimu.rate.kalman import FilterSettings, join, plausible_start, spread_rest
+from gfimu.rate.body_rate import LIKELIHOOD, Estimates
 from gfimu.rate.live import LiveRateFilter
-from gfimu.rate.refinement import refined
-from gfimu.rate.result import RateEstimate
+from gfimu.rate.result import DECIDED, RateEstimate, SignDecision, clear_of_zero
 from gfimu.rate.sensing import SensorErrors
+from gfimu.rate.settings import FilterSettings
+from gfimu.rate.signs import DISAGREEING, DISAGREES_OFTEN, SignJudge, likelier, merged, with_filter, with_signs
 
-__all__ = ["filter_rate", "increasing_times", "require_finite", "run_filter"]
+__all__ = ["filter_rate", "increasing_times", "smooth_rate"]
+
+_PREFERRED = 1.0  # samples' worth of decided signs from which the single samples choose between two rates
 
 
 def filter_rate(
@@ -29,7 +32,9 @@ def filter_rate(
     gyro: ArrayLike | None = None,
     progress: Callable[[float], object] | None = None,
 ) -> RateEstimate:
-    """Filter a recording: the causal estimate of the angular rate.
+    """Filter a recording: the estimate of the angular rate by the samples up to each.
+
+    Start, noise and the sign of a start in motion are inferred from the recording.
 
     Parameters
     ----------
@@ -48,26 +53,31 @@ def filter_rate(
     progress : callable, optional
         Called with the share of the work done so far, 0 to 1.
 
-    Returns
-    -------
-    RateEstimate
-        With an unknown start the whole run of the hypothesis that won; ``sign`` states from when on that was certain.
-        Until the rate exceeds what the biases allow it is zero, with a standard deviation that covers what they allow.
-
     Raises
     ------
     InputError
         If the shapes don't fit, time does not increase or there are fewer than two samples.
     GeometryError
-        If the array can't see all six motions, or can't find an unknown start.
+        If the array can't see all six motions.
     """
-    times, rows = np.asarray(t, dtype=float), np.asarray(readings, dtype=float)
-    chosen = plausible_start(array, times, rows, errors, settings or FilterSettings())
+    return _solve("filter", array, t, readings, errors, settings, gyro, progress, smooth=False)
 
-    def run(with_settings: FilterSettings) -> RateEstimate:
-        return run_filter(array, times, rows, errors, with_settings, gyro=gyro, progress=progress)[0]
 
-    return refined(array, times, rows, errors, chosen, run, causal=True)
+def smooth_rate(
+    array: AccelerometerArray,
+    t: ArrayLike,
+    readings: ArrayLike,
+    errors: SensorErrors,
+    settings: FilterSettings | None = None,
+    *,
+    gyro: ArrayLike | None = None,
+    progress: Callable[[float], object] | None = None,
+) -> RateEstimate:
+    """Smooth a recording: the estimate of the angular rate by all samples; arguments are those of `filter_rate`.
+
+    ``nis`` are those of the filter.
+    """
+    return _solve("smoother", array, t, readings, errors, settings, gyro, progress, smooth=True)
 
 
 def increasing_times(t: ArrayLike, needed_by: str) -> tuple[NDArray[np.float64], float]:
@@ -86,7 +96,63 @@ def increasing_times(t: ArrayLike, needed_by: str) -> tuple[NDArray[np.float64],
     return times, float(np.median(np.diff(times)))
 
 
-def require_finite(array: AccelerometerArray, result: RateEstimate) -> None:
+def _solve(
+    method: str,
+    array: AccelerometerArray,
+    t: ArrayLike,
+    readings: ArrayLike,
+    errors: SensorErrors,
+    settings: FilterSettings | None,
+    gyro: ArrayLike | None,
+    progress: Callable[[float], object] | None,
+    *,
+    smooth: bool,
+) -> RateEstimate:
+    times, period = increasing_times(t, f"the {method}")
+    live = LiveRateFilter(array, errors, period, settings, gyro=gyro is not None, progress=progress)
+    tracks = live.run_recording(times, readings, gyro, smooth=smooth)
+    assert live.start is not None
+    found = [live.estimate_of(times, out, method, index) for index, out in enumerate(tracks)]
+    signed = _signed(live, tracks, found)
+    _require_finite(array, signed)
+    return signed
+
+
+def _signed(live: LiveRateFilter, tracks: list[Estimates], found: list[RateEstimate]) -> RateEstimate:
+    """Choose the track, and the sign of each rate where it is in doubt."""
+    assert live.start is not None
+    judge = SignJudge(live.sets, live.start, live.period)
+    disagrees = np.mean(tracks[0].inflation > DISAGREEING) >= DISAGREES_OFTEN
+    if live.has_gyro or not judge.possible or not (live.start.sign_open or live.restarts or disagrees):
+        return replace(found[0], sign=SignDecision())
+    chances = [
+        judge.of_recording(live.samples, carried, out, one.rest)
+        for carried, out, one in zip(live.carried, tracks, found, strict=True)
+    ]
+    best, sure = likelier(*live.carried) if len(found) > 1 else (0, 0.5)
+    if len(found) > 1 and merged(found[0], found[1]):
+        sure = 1.0
+    if sure < DECIDED and len(found) > 1:  # the single samples may know better
+        scores = [float(np.sum(np.abs(chance - 0.5) * (chance - 0.5))) for chance in chances]
+        best = int(np.argmax(scores)) if max(scores) > _PREFERRED else best
+    chance = chances[best]
+    if (len(found) == 1 and not live.start.sign_open) or sure >= DECIDED:
+        chance = with_filter(chance)
+    result = with_signs(found[best], chance, known=not live.start.sign_open)
+    if len(found) == 1:
+        return result
+    if sure >= DECIDED:
+        result = replace(result, sign=replace(result.sign, state="decided"))
+    if result.sign.state == "undecided":
+        return replace(result, mirrored=replace(found[1 - best], sign=result.sign))
+    so_far = judge.of_stream(live.samples, live.carried[best], tracks[best], found[best].rest)
+    decided = np.flatnonzero((so_far > DECIDED) & clear_of_zero(result.omega, result.std))
+    at = float(result.t_s[decided[0]]) if decided.size else float(result.t_s[-1])
+    ratio = abs(float(live.carried[0].scalars[LIKELIHOOD] - live.carried[1].scalars[LIKELIHOOD]))
+    return replace(result, sign=replace(result.sign, decided_at_s=at, log_likelihood_ratio=ratio))
+
+
+def _require_finite(array: AccelerometerArray, result: RateEstimate) -> None:
     """Refuse an estimate that ran away.
 
     Raises
@@ -94,50 +160,9 @@ def require_finite(array: AccelerometerArray, result: RateEstimate) -> None:
     GeometryError
         If the rate is not finite everywhere: the array leaves products of ω in α that its null space doesn't see.
     """
-    broken = ~np.isfinite(result.omega).all(axis=1) & (result.channels.samples_without_rate == 0)
+    broken = ~np.isfinite(result.omega).all(axis=1)
     if broken.any():
         raise GeometryError(
             f"the rate ran away at t = {result.t_s[int(np.argmax(broken))]:.4g} s: array {array.name!r} leaves "
             "products of the rate in α, which feed back on themselves; turn slower, or use an array that sees them"
         )
-
-
-def run_filter(
-    array: AccelerometerArray,
-    t: ArrayLike,
-    readings: ArrayLike,
-    errors: SensorErrors,
-    settings: FilterSettings | None = None,
-    *,
-    gyro: ArrayLike | None = None,
-    progress: Callable[[float], object] | None = None,
-) -> tuple[RateEstimate, LiveRateFilter]:
-    """Like `filter_rate`; also returns the filter as it is at the end."""
-    times, period = increasing_times(t, "the filter")
-    live = LiveRateFilter(array, errors, period, settings, gyro=gyro is not None, progress=progress)
-    pushed, _ = live.push_raw(times, readings, gyro)
-    if not live.hypotheses:  # never clear of the biases
-        return live.describe(pushed[0]), live
-    last, _ = live.finish_raw()
-    rest = live.settings.rest
-    window = rest.window(live.period) if rest else 0
-    tracks = []
-    for index, first in enumerate(pushed):
-        # Once decided within the block, only the winner goes on.
-        if len(last) == len(pushed):
-            tracks.append(join([first, last[index]]))
-        elif index == live.winner:
-            tracks.append(join([first, last[0]]))
-    if live.sign.state == "decided" and len(tracks) == 2:  # decided by the very last samples
-        tracks = [tracks[live.winner]]
-    for hypothesis, track in zip(live.hypotheses, tracks, strict=True):
-        for begin, end in hypothesis.contradicted:
-            rows = (track.t >= begin) & (track.t <= end)
-            track.columns.omega[rows], track.columns.covariance[rows] = np.nan, np.nan
-    results = [
-        replace(hypothesis.estimate(track), sign=live.sign, rest=spread_rest(track.columns.rest, window))
-        for hypothesis, track in zip(live.hypotheses, tracks, strict=True)
-    ]
-    for result in results:
-        require_finite(array, result)
-    return (results[0] if len(results) == 1 else replace(results[0], mirrored=results[1])), live

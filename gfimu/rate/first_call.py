@@ -5,12 +5,12 @@ from __future__ import annotations
 from types import FunctionType
 from typing import Any
 
-from gfimu.rate.recursion import forward
+from gfimu.rate.body_rate import follow
 
 __all__ = ["must_compile"]
 
 
-def must_compile(kernel: Any = forward) -> bool:
+def must_compile(kernel: Any = follow) -> bool:
     """Whether the first call of a filter will compile it: nothing is compiled here or kept from an earlier run.
 
     numba keeps compiled code beside the source, or in ``NUMBA_CACHE_DIR``, once per installation and kind of processor.

@@ -1,10 +1,15 @@
-"""The rate filter as data arrive: known or unknown start, one sample at a time or in blocks, with the same answer."""
+"""The rate filter: of a stream in pieces, or of a recording fed at once.
+
+The first half second is waited for, because it shows how the run starts (`gfimu.rate.start`) and how large the noise
+is. A start that moves has two mirrored rates, which read the same: both are followed until the sign is decided.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cached_property
+from functools import partial
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -12,28 +17,73 @@ from numpy.typing import ArrayLike, NDArray
 
 from gfimu.array.array import AccelerometerArray
 from gfimu.base.errors import InputError
-from gfimu.rate.kalman import FilterOutput, FilterSettings, KalmanRateFilter, empty_output, join, unknown_std
-from gfimu.rate.live_accuracy import LiveAccuracy
-from gfimu.rate.result import ChannelReport, RateEstimate, SignDecision, full_covariance
+from gfimu.rate.body_rate import (
+    BIASES,
+    LAST_ALPHA,
+    RESTING,
+    SOLVED,
+    STARTED,
+    STILL,
+    TIME,
+    Carried,
+    Estimates,
+    Given,
+    Samples,
+    Tuning,
+    follow,
+    smooth_back,
+)
+from gfimu.rate.channel_errors import ChannelErrors, features_of, usual_moments
+from gfimu.rate.channel_sets import ChannelSets
+from gfimu.rate.increments import integrals
+from gfimu.rate.kernel import Record
+from gfimu.rate.measured_noise import measured_noise, timing_noise
+from gfimu.rate.reduction import Reduction
+from gfimu.rate.rest_test import MOVES, RestJudge, RestTest, still_blocks
+from gfimu.rate.result import (
+    DECIDED,
+    ChannelReport,
+    RateEstimate,
+    SignDecision,
+    clear_of_zero,
+    full_covariance,
+    joined_estimates,
+)
 from gfimu.rate.sensing import SensorErrors
-from gfimu.rate.sign import InitialRate, SignTest
-from gfimu.rate.start import START_S, contradicts_rest
+from gfimu.rate.settings import QUADRATURES, FilterSettings
+from gfimu.rate.signs import DISAGREEING, DISAGREES_OFTEN, SignJudge, likelier, merged, with_filter, with_signs
+from gfimu.rate.start import Start, infer_start
+from gfimu.rate.tuning import tuning_of
 
 __all__ = ["LiveRateFilter"]
 
+_HISTORY = 8  # numerical: samples kept before the next one, for stencils and differences of α
+_DOUBT_S = 5.0  # numerical: of the stream, over which the share of samples in disagreement is counted
+_PASSES = 8  # numerical: of the smoother about its last rates
+_STAYS = 0.02  # numerical: mean change of a rate in its standard deviations at which it stays
+_SMOOTHER_BLOCK = 512  # numerical: samples whose record is kept at once
 
-class _Samples(NamedTuple):
-    """Samples as they came."""
 
-    t: NDArray[np.float64]  # (n,)
-    readings: NDArray[np.float64]  # (n, c)
-    gyro: NDArray[np.float64] | None  # (n, 3)
+class LeadingRest(NamedTuple):
+    """What the rest at the start of a recording shows."""
 
-    @classmethod
-    def joined(cls, parts: list[_Samples]) -> _Samples:
-        """Join consecutive ones."""
-        gyro = None if parts[0].gyro is None else np.concatenate([part.gyro for part in parts if part.gyro is not None])
-        return cls(np.concatenate([part.t for part in parts]), np.concatenate([part.readings for part in parts]), gyro)
+    constants: NDArray[np.float64]  # (3 + m + q,) biases of α and z, errors of the channels
+    covariance: NDArray[np.float64]  # of them
+    rest: NDArray[np.bool_]  # (n,) samples of that rest
+
+    def of_alpha(self, samples: Samples) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return what the constants make of A y, (n, 3), and its slopes by them, (n, 3, 3 + m + q)."""
+        n, m = samples.z.shape
+        biases = np.broadcast_to(np.eye(3, 3 + m), (n, 3, 3 + m))
+        slopes = np.concatenate([biases, samples.alpha_errors], axis=2)
+        return slopes @ self.constants, slopes
+
+    def of_products(self, samples: Samples) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return what the constants make of z, (n, m), and its covariance, (n, m, m)."""
+        n, m = samples.z.shape
+        biases = np.broadcast_to(np.eye(3 + m)[3:], (n, m, 3 + m))
+        slopes = np.concatenate([biases, samples.product_errors], axis=2)
+        return slopes @ self.constants, slopes @ self.covariance @ np.swapaxes(slopes, 1, 2)
 
 
 class LiveRateFilter:
@@ -42,13 +92,13 @@ class LiveRateFilter:
     Parameters
     ----------
     array : AccelerometerArray
-        An array that sees all six motions.
+        An array that sees all six motions, with c channels.
     errors : SensorErrors
         Errors of its sensors.
     period : float
         Nominal sample period, s.
     settings : FilterSettings, optional
-        Start, quadrature, rest. With ``start_omega=None`` two filters follow ω and −ω until the sign is decided.
+        Start, quadrature, rest, noise.
     gyro : bool
         Whether gyro readings come along.
     progress : callable, optional
@@ -57,7 +107,7 @@ class LiveRateFilter:
     Raises
     ------
     GeometryError
-        If the array can't see all six motions, or can't find an unknown start.
+        If the array can't see all six motions.
 
     Examples
     --------
@@ -76,221 +126,497 @@ class LiveRateFilter:
         gyro: bool = False,
         progress: Callable[[float], object] | None = None,
     ) -> None:
-        self.array = array
-        self.errors = errors
-        self.period = period
+        self.array, self.errors, self.period = array, errors, period
         self.settings = settings or FilterSettings()
-        self._gyro = gyro
-        self._progress = progress
-        self._sign = SignDecision()
-        self._test = SignTest()
-        self.hypotheses: list[KalmanRateFilter] = []
-        self._limit = np.inf
+        self.sets = ChannelSets(array, errors.noise_std)
+        stencil = QUADRATURES[self.settings.quadrature]
+        self._ahead = stencil.points - 2 + stencil.before[0]
+        self._test = self.settings.rest or RestTest()
+        self._window = self._test.window(period)
+        self.has_gyro, self._progress = gyro, progress
+        self._waiting: list[tuple[NDArray[np.float64], ...]] = []
         self._last_time = -np.inf
-        self.started_at_s = np.nan
-        # A start at rest that doesn't look like rest leaves the sign in doubt: the bias of α was not learned.
-        self._unproven = 0
-        self._first: list[_Samples] = []  # of a start at rest, until they show whether it is one
-        self._tried = True
-        if self.settings.start_omega is not None:
-            rest = self.settings.rest
-            if rest is not None and not np.any(self.settings.start_omega):
-                self._unproven, self._tried = rest.window(period), False
-            self.hypotheses = [KalmanRateFilter(array, errors, period, self.settings, gyro=gyro)]
-            self.hypotheses[0].progress = progress
-        else:
-            self._sign = SignDecision("undecided", 0.0)
-            self._initial = InitialRate(array, errors)
+        self._received = 0
+        self.start: Start | None = None
+        self.carried: list[Carried] = []
+        self._stated_errors = ChannelErrors.stated(array, errors)
+        self._reduction = Reduction(self.sets, errors, period)
+        self._samples = self._reduction.none()
+        self._raw = np.zeros((0, array.n_channels))
+        self._base = self._done = 0  # number in the stream of buffer row 0; buffer row to filter next
+        self._resumed = 0  # buffer row to filter next, behind a first block that rests
+        self._pending: dict[int, list[Carried]] = {}  # states before the ends of blocks that may be rest, by number
+        self.restarts = 0
+        self._sign = SignDecision()
+        self._disagreeing = 0.0  # share of the last samples whose channels disagree
+
+    @property
+    def started(self) -> bool:
+        """Whether the start was inferred."""
+        return self.start is not None
 
     @property
     def sign(self) -> SignDecision:
-        """Whether the sign of ω is certain."""
+        """Whether the sign of the rate is certain, after the samples so far."""
         return self._sign
 
     @property
-    def current(self) -> KalmanRateFilter:
-        """The filter whose estimates are returned, the winner, or while undecided the first of the two."""
-        if not self.hypotheses:
-            raise InputError("the rate has not stood clear of the biases yet; an unknown start needs that")
-        return self.hypotheses[0]
-
-    @property
-    def winner(self) -> int:
-        """Which hypothesis won, 0 or 1; 0 while undecided."""
-        return self._test.winner or 0
+    def lag(self) -> int:
+        """Samples that must follow before an estimate appears."""
+        return self._ahead
 
     @property
     def report(self) -> ChannelReport:
         """What was wrong with the channels so far."""
-        return self.current.report if self.hypotheses else ChannelReport()
+        return replace(self._reduction.report(), restarts=self.restarts)
 
     def push(self, t: ArrayLike, readings: ArrayLike, gyro: ArrayLike | None = None) -> RateEstimate:
-        """Take one sample or a block; returns the estimates that are ready (the last ones need two more samples).
+        """Take one sample or a block; returns the estimates that are ready.
 
         Parameters
         ----------
-        t : array_like, shape (n,) or scalar
+        t : array_like, scalar or shape (n,)
             Sample times, s, later than all before.
-        readings : array_like, shape (n, c) or (c,)
+        readings : array_like, shape (c,) or (n, c)
             Specific force, m/s²; NaN where a channel is missing.
-        gyro : array_like, shape (n, 3) or (3,), optional
-            Gyro readings in body axes, rad/s; NaN where saturated or missing.
-
-        Returns
-        -------
-        RateEstimate
-            With the measured noise and the probability of the sign of each sample, by the samples so far
-            (`gfimu.rate.live_accuracy`).
+        gyro : array_like, shape (3,) or (n, 3), optional
+            Gyro, rad/s; NaN where saturated.
 
         Raises
         ------
         InputError
             If the shapes don't fit or time does not increase.
         """
-        times, rows = np.atleast_1d(np.asarray(t, dtype=float)), np.atleast_2d(np.asarray(readings, dtype=float))
-        if rows.shape == (len(times), self.array.n_channels):
-            if not (np.isfinite(times).all() and np.all(np.diff(times, prepend=self._last_time) > 0)):
-                raise InputError("sample times must be finite and increase; drop repeated or reordered samples")
-            self._last_time = float(times[-1]) if len(times) else self._last_time
-            noise = self._accuracy.take(times, rows)
-            for hypothesis in self.hypotheses:
-                hypothesis.noise = noise
-        return self._accurate(self._result(*self.push_raw(times, rows, gyro)))
+        times, rows, turning = self._checked(t, readings, gyro)
+        found = []
+        # The last sample of each block of the rest test by itself, so that the answer is that of single samples.
+        to_end = self._window - self._received % self._window
+        ends = range(to_end, len(times) + 1, self._window)
+        edges = sorted({0, len(times), *ends, *(end - 1 for end in ends)})
+        for first, last in pairwise(edges):
+            self._waiting.append((times[first:last], rows[first:last], turning[first:last]))
+            self._received += last - first
+            if not self.started and self._received >= self._window + self._ahead:
+                self._begin(self._window)
+            if self.started:
+                found.append(self._estimate(*self._advance(closing=False)))
+        return joined_estimates(found) if found else self._estimate(*self._nothing())
 
     def finish(self) -> RateEstimate:
-        """Return the estimates of the last samples, for which no more neighbours will come."""
-        return self._accurate(self._result(*self.finish_raw()))
+        """Return the estimates of the last samples."""
+        if not self.started:
+            if not self._waiting:
+                return self._estimate(*self._nothing())
+            self._begin(self._window)
+        return self._estimate(*self._advance(closing=True))
 
-    @cached_property
-    def _accuracy(self) -> LiveAccuracy:
-        return LiveAccuracy(self.array, self.errors, self.period)
+    def _nothing(self) -> tuple[Samples, list[Estimates]]:
+        return self._reduction.none(), [Estimates.empty(0)]
 
-    def _accurate(self, found: RateEstimate) -> RateEstimate:
-        """Add the measured noise and the probability of the sign."""
-        return self._accuracy.describe(found, self.current if self.hypotheses else None) if len(found) else found
-
-    def push_raw(
-        self, t: ArrayLike, readings: ArrayLike, gyro: ArrayLike | None = None
-    ) -> tuple[list[FilterOutput], int | None]:
-        """Like `push`, with the outputs of all hypotheses, and the sample that decided if one did."""
+    def _checked(
+        self, t: ArrayLike, readings: ArrayLike, gyro: ArrayLike | None
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Return samples as arrays (n,), (n, c) and (n, 3)."""
         times = np.atleast_1d(np.asarray(t, dtype=float))
         rows = np.atleast_2d(np.asarray(readings, dtype=float))
-        turning = None if gyro is None else np.atleast_2d(np.asarray(gyro, dtype=float))
-        if not self._tried and len(times) and rows.shape == (len(times), self.array.n_channels):
-            emitted = self._try(times, rows, turning)
-            if emitted is not None:
-                times, rows, turning = _Samples.joined(self._first)
-                outputs, place = self.push_raw(times, rows, turning)
-                shown = [output.rows(slice(emitted, None)) for output in outputs]
-                return shown, None if place is None else max(0, place - emitted)
-        if self.hypotheses:
-            return self._judge([hypothesis.push(times, rows, turning) for hypothesis in self.hypotheses])
-        waiting, first = self._wait(times, rows)
-        outputs = [
-            join([waiting, hypothesis.push(times[first:], rows[first:], None if turning is None else turning[first:])])
-            for hypothesis in self.hypotheses
-        ]
-        return self._judge(outputs) if outputs else ([waiting], None)
-
-    def _try(self, t: NDArray[np.float64], rows: NDArray[np.float64], gyro: NDArray[np.float64] | None) -> int | None:
-        """See by the first readings whether a start at rest can be one.
-
-        If it can't, the filter starts anew, in the dark: returned is of how many samples estimates were given before.
-        """
-        before = sum(len(part.t) for part in self._first)
-        self._first.append(_Samples(t, rows, gyro))
-        started = self._first[0].t[0]
-        if t[-1] < started + START_S:
-            return None
-        self._tried = True
-        first = _Samples.joined(self._first)
-        if not contradicts_rest(self.array, first.readings[first.t < started + START_S], self.errors):
-            self._first = []
-            return None
-        lag = self.hypotheses[0].lag
-        self.settings, self.hypotheses, self._unproven = replace(self.settings, start_omega=None), [], 0
-        self._sign, self._initial = SignDecision("undecided", 0.0), InitialRate(self.array, self.errors)
-        return max(0, before - lag)
-
-    def finish_raw(self) -> tuple[list[FilterOutput], int | None]:
-        """Like `finish`, with the outputs of all hypotheses, and the sample that decided if one did."""
-        if not self.hypotheses:
-            return [FilterOutput(np.empty(0), empty_output(0))], None
-        return self._judge([hypothesis.finish() for hypothesis in self.hypotheses])
-
-    def _wait(self, t: NDArray[np.float64], rows: NDArray[np.float64]) -> tuple[FilterOutput, int]:
-        """Wait for a sample to start from; returns what is known until then, and the place of that sample."""
-        if rows.shape != (len(t), self.array.n_channels):
+        if rows.shape != (len(times), self.array.n_channels):
             raise InputError(
-                f"readings have shape {rows.shape}; {len(t)} times of array {self.array.name!r} need "
-                f"({len(t)}, {self.array.n_channels})"
+                f"readings have shape {rows.shape}; {len(times)} times of array {self.array.name!r} need "
+                f"({len(times)}, {self.array.n_channels})"
             )
-        columns = empty_output(len(t))
-        for column in (columns.omega, columns.covariance, columns.nis, columns.dof, columns.likelihood,
-                       columns.manoeuvre):  # fmt: skip
-            column[:] = 0
-        complete = np.all(np.abs(rows) < self.errors.limits, axis=1)
-        for index in range(len(t)):
-            if complete[index]:
-                found, clear = self._initial.find(rows[index])
-                if clear:
-                    self._begin(found)
-                    self.started_at_s = float(t[index])
-                    return FilterOutput(t, columns).rows(slice(0, index)), index
-                self._limit = self._initial.limit(found)
-            columns.covariance[index, :3] = self._limit**2
-        return FilterOutput(t, columns), len(t)
+        if len(times) and not (
+            np.isfinite(times).all() and times[0] > self._last_time and np.all(times[1:] > times[:-1])
+        ):
+            raise InputError("sample times must be finite and increase; drop repeated or reordered samples")
+        turning = np.full((len(times), 3), np.nan)
+        if gyro is not None:
+            turning = np.atleast_2d(np.asarray(gyro, dtype=float))
+            if turning.shape != (len(times), 3):
+                raise InputError(f"gyro has shape {turning.shape}; {len(times)} times need ({len(times)}, 3)")
+        if len(times):
+            self._last_time = float(times[-1])
+        return times, rows, turning
 
-    def _begin(self, found: NDArray[np.float64]) -> None:
-        """Start both hypotheses."""
-        std = unknown_std(found)
-        for sign in (1.0, -1.0):
-            start = replace(self.settings, start_omega=sign * found, start_std=std)
-            self.hypotheses.append(
-                KalmanRateFilter(self.array, self.errors, self.period, start, gyro=self._gyro, likelihood=True)
-            )
-            self.hypotheses[-1].progress = self._progress
+    def _take_recording(self, t: ArrayLike, readings: ArrayLike, gyro: ArrayLike | None) -> None:
+        """Take a whole recording, begin and reduce it."""
+        self._waiting = [self._checked(t, readings, gyro)]
+        self._begin(len(self._waiting[0][0]), whole=True)
 
-    def _judge(self, outputs: list[FilterOutput]) -> tuple[list[FilterOutput], int | None]:
-        """Compare the hypotheses; once decided, drop the loser."""
-        if len(outputs) < 2:
-            self._prove(outputs[0].columns.rest)
-            if self.current.restarts:
-                self._sign = SignDecision("undecided", 0.0)
-            return outputs, None
-        place = self._test.update(outputs[0].columns, outputs[1].columns)
-        ratio = self._test.log_likelihood_ratio
-        if place is None:
-            self._sign = SignDecision("undecided", ratio)
-        else:
-            self._sign = SignDecision("decided", abs(ratio), float(outputs[0].t[place]))
-            self.hypotheses = [self.hypotheses[self.winner]]
-            self.hypotheses[0].guarded = True
-        return outputs, place
-
-    def _prove(self, rest: NDArray[np.bool_]) -> None:
-        """See whether the first block of a start at rest is rest."""
-        if self._unproven > 0:
-            first = rest[: self._unproven]
-            self._unproven = 0 if first.any() else self._unproven - len(first)
-            if self._unproven == 0 and not first.any() and len(first):
-                self._sign = SignDecision("undecided", 0.0)
-
-    def _result(self, outputs: list[FilterOutput], place: int | None) -> RateEstimate:
-        if not self.hypotheses:
-            return self.describe(outputs[0])
-        if len(outputs) == 1:
-            return self.current.estimate(outputs[0], sign=self._sign)
-        if place is not None:
-            parts = [outputs[0].rows(slice(0, place)), outputs[self.winner].rows(slice(place, None))]
-            return self.current.estimate(join(parts), sign=self._sign)
-        mirrored = self.hypotheses[1].estimate(outputs[1], sign=self._sign)
-        return self.current.estimate(outputs[0], sign=self._sign, mirrored=mirrored)
-
-    def describe(self, waiting: FilterOutput) -> RateEstimate:
-        """Turn output from before the start into a result."""
-        columns = waiting.columns
-        return RateEstimate(
-            "filter", waiting.t, columns.omega, full_covariance(columns.covariance), columns.nis, columns.dof,
-            columns.rest, self._sign,
+    def _begin(self, known: int, *, whole: bool = False) -> None:
+        """Measure the noise by the first ``known`` samples, or the ``whole`` recording; infer the start."""
+        t, rows, _ = (np.concatenate(column)[:known] for column in zip(*self._waiting, strict=True))
+        usable = np.where(np.abs(rows) < self.errors.limits, rows, np.nan)
+        if self.settings.measure_noise:
+            self.sets = ChannelSets(self.array, measured_noise(self.sets, usable, self.period))
+            times = timing_noise(self.sets, t, usable)
+            self.errors = replace(self.errors, timing_std=max(self.errors.timing_std, times))
+        self._consider(usable, whole=whole)
+        sets, m, q = self.sets, self.sets.products, len(self._reduction.considered)
+        first = usable[: self._window]
+        complete = first[np.isfinite(first).all(axis=1)]
+        noise = self.errors.noise_at_rest(sets.noise_std)
+        still = bool(np.any(still_blocks(first, noise, self.period, self._test.of_start)))
+        prior = sets.bias_covariance(np.diag(self.errors.bias_std**2))
+        self.start = start = self._inferred(complete, prior, still=still)
+        prior = start.bias_factor * prior
+        errors_at = 9 + m + 3 * self.has_gyro
+        self.tuning: Tuning = tuning_of(
+            sets, self.errors, self.period, self.settings, errors_at=errors_at,
+            solved_in_motion=errors_at + q if self.has_gyro else 9, compares=start.sign_open,
         )  # fmt: skip
+        self._judge = RestJudge(sets.full.alpha_noise / self._window, self._test)
+        self._signs = SignJudge(sets, start, self.period)
+        before = self._covariance_before(prior, errors_at)
+        carried = Carried.at_start(
+            t[0], start.omega, start.std, before, prior[3:, 3:] + self._errors_of_products, sets.full.sensitivity
+        )
+        if start.sign_open:
+            carried.counts[SOLVED] = self.tuning.solved_in_motion
+        elif still and not start.omega.any() and len(complete) == len(first):
+            learnt = np.r_[BIASES : 9 + m, errors_at : errors_at + q]
+            carried.x[learnt], carried.covariance[np.ix_(learnt, learnt)] = self._learnt(prior, complete)
+            carried.last_z[:] = sets.full.product_rows @ complete[-1]
+            carried.counts[[STARTED, RESTING]], carried.counts[STILL] = 1, self.tuning.rest_entry
+            carried.scalars[[TIME, LAST_ALPHA]] = t[len(complete) - 1]
+            self._resumed = len(complete)
+        self.carried = [carried]
+        if start.sign_open and start.omega.any():
+            mirrored = carried.copy()
+            mirrored.x[:3] = -start.omega
+            self.carried.append(mirrored)
+
+    def _inferred(self, complete: NDArray[np.float64], prior: NDArray[np.float64], *, still: bool) -> Start:
+        """Return the start that is stated, or that the complete readings (k, c) of the first block show."""
+        if self.settings.start_omega is not None:
+            std = np.full(3, self.settings.start_std)
+            return Start("given", self.settings.start_omega, std, np.diag(std**2))
+        turned = self._errors_of_mean(complete)
+        spread = (prior + turned @ turned.T)[3:, 3:]
+        z = complete @ self.sets.full.product_rows.T
+        return infer_start(self.sets, z, spread, still=still, rest_std=self._test.rate_std)
+
+    def _covariance_before(self, biases: NDArray[np.float64], errors_at: int) -> NDArray[np.float64]:
+        """Return the covariance of the state before the run, but for the rate, (n, n)."""
+        size = errors_at + len(self._reduction.considered)
+        gyro = range(BIASES + len(biases), errors_at)
+        before = np.zeros((size, size))
+        settled = (1.0 + self.tuning.overshoot) / (1.0 - self.tuning.overshoot)
+        before[3:6, 3:6] = settled * self.sets.full.alpha_noise
+        before[BIASES : gyro.start, BIASES : gyro.start] = biases
+        before[gyro, gyro] = self.errors.gyro_bias_std**2
+        before[range(errors_at, size), range(errors_at, size)] = 1.0
+        return before
+
+    def _advance(self, *, closing: bool) -> tuple[Samples, list[Estimates]]:
+        """Filter the samples that are ready; returns them, and the estimates of each track."""
+        until = self._prepare(closing=closing)
+        first = self._done
+        if until == first:
+            return self._nothing()
+        outputs = [self._resting(first, until) for _ in self.carried]
+        self._filter(self._resumed, until, outputs, -first)
+        self._done = self._resumed = until
+        self.restarts += int(outputs[0].restart.sum())
+        ready = Samples._make(column[first:until] for column in self._samples)
+        self._trim()
+        return ready, outputs
+
+    def _resting(self, first: int, last: int) -> Estimates:
+        """Return room for rows ``first`` to ``last − 1``, with the estimates of a first block that rests."""
+        out = Estimates.empty(last - first)
+        if first < self._resumed:
+            rows = slice(0, self._resumed - first)
+            out.omega[rows], out.covariance[rows] = 0.0, 0.0
+            out.covariance[rows, :3] = self.tuning.rest_variance
+            out.rest[rows.stop - 1] = True
+        return out
+
+    def _filter(self, first: int, last: int, outputs: list[Estimates], offset: int) -> None:
+        """Filter rows ``first`` to ``last − 1`` with each track, and keep the states before ends of open blocks."""
+        tables, record = self.sets.tables(), self._record(0)
+        ends = self._block_ends(first, last)
+        window = self._window
+        open_ends = [end for end in ends if (end + self._base) // window >= self._judge.final]
+        for begin, end in pairwise([first, *open_ends, last]):
+            if begin in open_ends:
+                self._pending[begin + self._base] = [carried.copy() for carried in self.carried]
+            for carried, out in zip(self.carried, outputs, strict=True):
+                follow(self._samples, Given.nothing(), begin, end, tables, self.tuning, carried, out, offset, record)
+
+    def _block_ends(self, first: int, last: int) -> range:
+        """Return the rows among ``first`` to ``last − 1`` at which a block for the rest test ends."""
+        if self.settings.rest is None:
+            return range(0)
+        window = self._window
+        return range(first + (-(first + self._base) - 1) % window, last, window)
+
+    def _prepare(self, *, closing: bool) -> int:
+        """Reduce the samples that wait and judge them for rest; returns the row up to which they can be filtered."""
+        if self._waiting:
+            t, rows, gyro = (np.concatenate(column) for column in zip(*self._waiting, strict=True))
+            self._waiting = []
+            new = self._reduction.reduce(self._raw, self._samples, t, rows, gyro)
+            self._samples = Samples._make(
+                np.concatenate([old, added]) for old, added in zip(self._samples, new, strict=True)
+            )
+            self._raw = np.concatenate([self._raw, rows])
+        samples, n = self._samples, len(self._samples.t)
+        until = n if closing else max(self._done, n - self._ahead)
+        low = max(0, self._done - _HISTORY)
+        samples.increment[self._done : n] = integrals(
+            samples.t[low:], samples.alpha[low:], samples.channel_set[low:], self.period, self.settings.quadrature
+        )[self._done - low :]
+        self._reduction.add_errors(samples, max(0, self._done - self._ahead))
+        self._judge_blocks(closing=closing)
+        return until
+
+    def _record(self, length: int) -> Record:
+        m = self.sets.products
+        size = self.tuning.errors_at + len(self._reduction.considered)
+        return Record.empty(length, 6, size, m + 9 + 3 * self.has_gyro)
+
+    def _judge_blocks(self, *, closing: bool) -> None:
+        """Mark the blocks that are decided to be rest or not; filter again from the end of one that is decided anew."""
+        if self.settings.rest is None:
+            return
+        window, samples = self._window, self._samples
+        first = len(self._judge) * window - self._base
+        noise = self.errors.noise_at_rest(self.sets.noise_std)
+        still = still_blocks(self._raw[first:], noise, self.period, self._test)
+        alpha = samples.alpha[first : first + len(still) * window].reshape(-1, window, 3).mean(axis=1)
+        for block, verdict in self._judge.decide(still, alpha, closing=closing):
+            row = (block + 1) * window - 1 - self._base
+            if row < 0 or row < self._resumed - self._done:  # the first block, from which the filter started
+                continue
+            changes, samples.still[row] = samples.still[row] != verdict, verdict
+            final = block < self._judge.final
+            before = self._pending.pop(row + self._base, None) if final else None
+            if changes and before is not None:
+                self.carried = before
+                again = [Estimates.empty(self._done - row) for _ in before]
+                self._filter(row, self._done, again, -row)
+
+    def _trim(self) -> None:
+        """Drop rows that nothing needs any longer."""
+        pending = [row - self._base for row in self._pending]
+        keep = min(self._done - max(_HISTORY, self._window), *pending, len(self._raw))
+        keep = min(keep, len(self._judge) * self._window - self._base, len(self._raw) - self.errors.stuck_after)
+        if keep > 4 * self._window:
+            self._samples = Samples._make(column[keep:].copy() for column in self._samples)
+            self._raw = self._raw[keep:].copy()
+            self._base += keep
+            self._done -= keep
+            self._resumed -= keep
+
+    @property
+    def noise_ratio(self) -> float:
+        """Measured noise of the channels over the stated one, root mean square."""
+        return float(np.sqrt(np.mean(np.square(self.sets.noise_std / self.errors.noise_std))))
+
+    @property
+    def samples(self) -> Samples:
+        """The samples that are kept, of a recording all."""
+        return self._samples
+
+    def run_recording(
+        self, t: ArrayLike, readings: ArrayLike, gyro: ArrayLike | None = None, *, smooth: bool
+    ) -> list[Estimates]:
+        """Filter a whole recording at once, and smooth it if asked; returns the estimates of each rate followed.
+
+        The statistics of the innovations are those of the filter.
+        """
+        self._take_recording(t, readings, gyro)
+        until = self._prepare(closing=True)
+        outputs = []
+        for index, carried in enumerate(self.carried):
+            start, out = carried.copy(), self._resting(0, until)
+            report = partial(self._report_progress, index)
+            kept = self._forward(carried, Given.nothing(), out, report)
+            if smooth:
+                self._smooth(start, kept, out, report)
+            outputs.append(out)
+        self._done = self._resumed = until
+        self.restarts += int(outputs[0].restart.sum())
+        return outputs
+
+    def _forward(
+        self, carried: Carried, given: Given, out: Estimates, report: Callable[[float], object]
+    ) -> list[tuple[int, int, Carried]]:
+        """Filter a whole recording; returns blocks of it, each with the state before."""
+        kept, until = [], len(out.nis)
+        tables, record = self.sets.tables(), self._record(0)
+        for first in range(self._resumed, until, _SMOOTHER_BLOCK):
+            last = min(first + _SMOOTHER_BLOCK, until)
+            kept.append((first, last, carried.copy()))
+            follow(self._samples, given, first, last, tables, self.tuning, carried, out, 0, record)
+            report(0.4 * last / until)
+        return kept
+
+    def _smooth(
+        self, start: Carried, kept: list[tuple[int, int, Carried]], out: Estimates, report: Callable[[float], object]
+    ) -> None:
+        """Replace rates of a filter by smoothed ones.
+
+        Where the errors of the null space were not estimated from the first sample on, everything is linearised about
+        the last rates and estimated anew, until the rates stay: Gauss and Newton's method for the whole run (B. M.
+        Bell, The iterated Kalman smoother as a Gauss-Newton method, SIAM J. Optim. 4, 1994).
+        """
+        if start.counts[SOLVED] == len(start.x) and not out.restart.any():
+            self._backward(kept, Given.nothing(), out, report)
+            return
+        start.counts[SOLVED] = len(start.x)
+        for _ in range(_PASSES):
+            before = out.omega.copy()
+            given = Given(before, out.inflation, out.rest, out.restart)
+            again = self._resting(0, len(out.nis))
+            kept = self._forward(start.copy(), given, again, report)
+            self._backward(kept, given, out, report)
+            moved = np.abs(out.omega - before) / np.sqrt(out.covariance[:, :3])
+            if np.nanmean(moved) < _STAYS:
+                break
+
+    def _backward(
+        self, kept: list[tuple[int, int, Carried]], given: Given, out: Estimates, report: Callable[[float], object]
+    ) -> None:
+        """Smooth blocks of a recording from the last to the first; fills the rates and their covariance."""
+        size, until = len(kept[0][2].x) if kept else 0, len(out.nis)
+        adjoint, curvature = np.zeros(size), np.zeros((size, size))
+        tables, record, again = self.sets.tables(), self._record(_SMOOTHER_BLOCK), Estimates.empty(_SMOOTHER_BLOCK)
+        for first, last, state in reversed(kept):
+            follow(self._samples, given, first, last, tables, self.tuning, state, again, -first, record)
+            smooth_back(record, out.restart, first, last, adjoint, curvature, out.omega, out.covariance)
+            report(1.0 - 0.6 * first / until)
+
+    def leading_rest(self, t: ArrayLike, readings: ArrayLike) -> LeadingRest:
+        """Reduce a whole recording; returns what the rest at its start shows, or the stated errors without a rest."""
+        self._take_recording(t, readings, None)
+        self._prepare(closing=True)
+        window, m = self._window, self.sets.products
+        rest = np.zeros(len(self._samples.t), dtype=np.bool_)
+        prior = self.carried[0].prior[BIASES : 9 + m, BIASES : 9 + m]
+        if self._resumed:
+            verdicts = self._samples.still[2 * window - 1 :: window]
+            rest[: (1 + int(np.argmin(np.append(verdicts, MOVES) != MOVES))) * window] = True
+        usable = np.where(np.abs(self._raw) < self.errors.limits, self._raw, np.nan)[rest]
+        return LeadingRest(*self._learnt(prior, usable[np.isfinite(usable).all(axis=1)]), rest)
+
+    def channel_biases(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the biases (c,), m/s², that α, the null space and the parity rows show now, and their covariance.
+
+        They are the least ones: what of a bias looks like a specific force stays unknown.
+        """
+        full, m, parity = self.sets.full, self.sets.products, self.sets.parity_rows
+        back = np.linalg.pinv(np.vstack([full.alpha_rows, full.product_rows, parity]))
+        values = np.concatenate([self.carried[0].x[BIASES : 9 + m], self._reduction.parity_mean])
+        spread = np.zeros((len(values), len(values)))
+        spread[: 3 + m, : 3 + m] = self.carried[0].covariance[BIASES : 9 + m, BIASES : 9 + m]
+        return np.asarray(back @ values), np.asarray(back @ spread @ back.T)
+
+    def _consider(self, readings: NDArray[np.float64], *, whole: bool) -> None:
+        """Choose the errors of the channels that are considered, by the motion in readings (n, c).
+
+        Of a stream that is not ``whole``, further motion in all directions is expected.
+        """
+        considered, m = None, self.sets.products
+        self._errors_of_products = np.zeros((m, m))
+        if len(self._stated_errors):
+            complete = readings[np.isfinite(readings).all(axis=1)]
+            features = features_of(self.array, complete, np.ones(self.array.n_channels, dtype=np.bool_))
+            moments = features.T @ features / max(len(features), 1)
+            if not whole:
+                moments = moments + usual_moments()
+            considered = self._stated_errors.excited(self.sets, moments, self.period)
+            self._errors_of_products = considered.covariance_of(self.sets.full.product_rows, moments)
+        self._reduction = Reduction(self.sets, self.errors, self.period, considered, self._stated_errors)
+        self._samples = self._reduction.none()
+
+    def _errors_of_mean(self, readings: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return what each considered error makes of the mean of [A y; Z y] over complete readings, (3 + m, q)."""
+        considered, full = self._reduction.considered, self.sets.full
+        if not (len(considered) and len(readings)):
+            return np.zeros((3 + self.sets.products, len(considered)))
+        features = features_of(self.array, readings, np.ones(self.array.n_channels, dtype=np.bool_)).mean(axis=0)
+        of_alpha, of_z = considered.of_motion(full, features[None])
+        return np.vstack([of_alpha[0], of_z[0]])
+
+    def _learnt(
+        self, prior: NDArray[np.float64], readings: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return [b_α; b_z; φ] (3 + m + q) and its covariance after complete readings (n, c) at rest.
+
+        ``prior`` (3 + m, 3 + m) is that of the biases.
+        """
+        count, q = len(prior), len(self._reduction.considered)
+        covariance = np.zeros((count + q, count + q))
+        covariance[:count, :count] = prior
+        covariance[range(count, count + q), range(count, count + q)] = 1.0
+        if not len(readings):
+            return np.zeros(count + q), covariance
+        slopes = np.hstack([np.eye(count), self._errors_of_mean(readings)])
+        spread = slopes @ covariance @ slopes.T + self._noise_of_mean(len(readings))
+        gain = np.linalg.solve(spread, slopes @ covariance).T
+        shown = np.vstack([self.sets.full.alpha_rows, self.sets.full.product_rows]) @ readings.mean(axis=0)
+        return gain @ shown, covariance - gain @ spread @ gain.T
+
+    def _noise_of_mean(self, count: int) -> NDArray[np.float64]:
+        """Covariance of the mean of [A y; Z y] over so many samples at rest, shape (3 + m, 3 + m)."""
+        full = self.sets.full
+        rows = np.vstack([full.alpha_rows, full.product_rows])
+        noise = rows * self.sets.noise_std**2 @ rows.T / count
+        noise[range(3), range(3)] += 2.0 * (self._test.rate_std / (count * self.period)) ** 2
+        return np.asarray(noise)
+
+    def _report_progress(self, track: int, share: float) -> None:
+        if self._progress is not None:
+            self._progress((track + share) / len(self.carried))
+
+    def _estimate(self, samples: Samples, tracks: list[Estimates]) -> RateEstimate:
+        """Return the estimate of the rate that is followed, or of the more probable one of two."""
+        out = tracks[0]
+        found = self.estimate_of(samples.t, out)
+        if not len(found) or self.start is None:
+            return found
+        for large in out.inflation > DISAGREEING:
+            self._disagreeing += (large - self._disagreeing) * self.period / _DOUBT_S
+        doubt = self.start.sign_open or self.restarts > 0 or self._disagreeing >= DISAGREES_OFTEN
+        if self.has_gyro or not (self._signs.possible and doubt):
+            return replace(found, sign_probability=np.full(len(found), 0.5 if self.start.sign_open else 1.0))
+        chance = self._signs.of_stream(samples, self.carried[0], out, found.rest)
+        if len(tracks) > 1:
+            best, sure = likelier(*self.carried)
+            other = self.estimate_of(samples.t, tracks[1], index=1)
+            sure = 1.0 if merged(found, other) else sure
+            if sure < DECIDED and clear_of_zero(found.omega[-1:], found.std[-1:])[0]:
+                best, sure = int(chance[-1] < 0.5), max(chance[-1], 1.0 - chance[-1])
+            if sure >= DECIDED:
+                self.carried = [self.carried[best]]
+                self._pending = {row: [kept[best]] for row, kept in self._pending.items()}
+        if not self.start.sign_open or len(self.carried) == 1:
+            chance = with_filter(chance)
+        signed = with_signs(found, chance, known=not self.start.sign_open)
+        self._sign = signed.sign
+        return signed
+
+    def estimate_of(
+        self, t: NDArray[np.float64], out: Estimates, method: str = "filter", index: int = 0
+    ) -> RateEstimate:
+        """Return a result of a track's output."""
+        sign = SignDecision("undecided", 0.0) if len(self.carried) > 1 or self.restarts else SignDecision()
+        carried = self.carried[index] if self.carried else None
+        biases = slice(BIASES, self.tuning.errors_at) if self.carried else slice(0)
+        return RateEstimate(
+            method, t, out.omega, full_covariance(out.covariance), out.nis, out.dof,
+            spread_rest(out.rest, self._window), sign,
+            bias=None if carried is None else carried.x[biases].copy(),
+            bias_covariance=None if carried is None else carried.covariance[biases, biases].copy(),
+            channels=self.report, scale=self.noise_ratio * np.sqrt(out.inflation), stated_nis=out.stated,
+            start=self.start,
+        )  # fmt: skip
+
+
+def spread_rest(ends: NDArray[np.bool_], window: int) -> NDArray[np.bool_]:
+    """Mark every sample of the blocks of rest of ``window`` samples that end at ``ends``, shape (n,)."""
+    rest = np.zeros(len(ends), dtype=bool)
+    for end in np.flatnonzero(ends):
+        rest[max(end - window + 1, 0) : end + 1] = True
+    return rest

@@ -8,15 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from gfimu.array.array import AccelerometerArray
-from gfimu.rate.null_readings import null_readings
-from gfimu.rate.per_sample import KnownStart, per_sample_estimate
-from gfimu.rate.result import RateEstimate
-from gfimu.rate.sensing import SensorErrors
-
-__all__ = ["maximum_likelihood_rate", "rate_of_null_space", "rates_of_null_space"]
+__all__ = ["rate_of_null_space", "rates_of_null_space"]
 
 _ITERATIONS = 60
 _CONVERGED = 1e-10
@@ -25,48 +19,6 @@ _LEAST_SEEN = 1e-12  # numerical: determinant of the information, its trace 1, b
 _STARTS = np.array(
     [[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1], [1, 1, -1], [1, -1, 1], [-1, 1, 1]], dtype=float
 ) / np.sqrt([[1], [1], [1], [3], [3], [3], [3]])  # fmt: skip
-
-
-def maximum_likelihood_rate(
-    array: AccelerometerArray,
-    t: ArrayLike,
-    readings: ArrayLike,
-    errors: SensorErrors,
-    *,
-    start_at_rest: bool = True,
-    start: KnownStart | None = None,
-) -> RateEstimate:
-    """Estimate the rate of each sample by maximum likelihood.
-
-    Parameters
-    ----------
-    array : AccelerometerArray
-        An array whose null space sees at least three products of ω.
-    t : array_like, shape (n,)
-        Sample times, s.
-    readings : array_like, shape (n, c)
-        Specific force, m/s².
-    errors : SensorErrors
-        Noise of the channels, and their range.
-    start_at_rest : bool
-        Whether constant readings at the start are rest, whose mean is removed as bias.
-    start : KnownStart, optional
-        Rate at the first sample, where the run starts turning at a known rate.
-
-    Returns
-    -------
-    RateEstimate
-        With the probability of each sample's sign; ``nis`` is the remaining sum of squares in units of the stated
-        noise, and the covariance is enlarged where that is significantly too large (`gfimu.rate.disagreement`).
-
-    Raises
-    ------
-    GeometryError
-        If the array sees fewer than three products.
-    """
-    null = null_readings(array, t, readings, errors, least_rank=3, start_at_rest=start_at_rest)
-    omega, covariance = rates_of_null_space(null.z, null.sensitivity)
-    return per_sample_estimate("ml", null, omega, covariance, array, errors, start)
 
 
 def rates_of_null_space(

@@ -19,10 +19,10 @@ from collections.abc import Callable
 from numpy.typing import ArrayLike
 
 from gfimu.array.array import AccelerometerArray
-from gfimu.rate.kalman import FilterSettings
 from gfimu.rate.registry import RATE_METHODS, rate_method
 from gfimu.rate.result import RateEstimate
 from gfimu.rate.sensing import SensorErrors
+from gfimu.rate.settings import FilterSettings
 
 __all__ = ["RATE_METHODS", "estimate_rate"]
 
@@ -81,6 +81,4 @@ def estimate_rate(
         return chosen.solver(array, t, readings, errors, start, gyro=gyro, progress=progress)
     if gyro is not None:
         chosen.refuse_gyro()
-    if chosen.open_loop and start.start_omega is None:
-        chosen.refuse_unknown_start()
     return chosen.solver(array, t, readings, errors, start)

@@ -14,6 +14,7 @@ from gfimu.array.linear_solution import LinearSolution
 from gfimu.base.short_repr import short_repr
 from gfimu.rate.disagreement import Disagreement
 from gfimu.rate.result import ChannelReport
+from gfimu.rate.sensing import SensorErrors
 
 __all__ = ["RateProblem", "RateSolution"]
 
@@ -30,10 +31,10 @@ class RateProblem:
         Sample times, s, strictly increasing.
     readings : ndarray, shape (n, c)
         Specific force along the channels, m/s²; NaN where one is missing.
-    noise_std : ndarray, shape (c,)
-        Standard deviation of one sample of each channel, m/s².
-    bias_std : ndarray, shape (c,), or None
-        Uncertainty of the constant bias of each channel, m/s²; None where the data sheets say it.
+    errors : SensorErrors
+        Errors of the sensors.
+    calibrated : bool
+        Whether they are those that a calibration leaves.
     linear : LinearSolution
         The part of α and p that is linear in the readings, and what ω adds to it.
     omega0 : ndarray, shape (3,), or None
@@ -49,8 +50,8 @@ class RateProblem:
     array: AccelerometerArray
     t_s: NDArray[np.float64]
     readings: NDArray[np.float64]
-    noise_std: NDArray[np.float64]
-    bias_std: NDArray[np.float64] | None
+    errors: SensorErrors
+    calibrated: bool
     linear: LinearSolution
     omega0: NDArray[np.float64] | None
     gyro: NDArray[np.float64] | None = None
@@ -85,7 +86,7 @@ class RateSolution:
         said = ChannelReport(**contradicted).sentences()
         if self.remarks.get("calibration_biases_contradicted"):
             said.append(
-                "the first readings contradict the calibration's biases, so their uncertainty is the data sheet's; was "
+                "the first readings contradict the calibration's biases, so their uncertainty is taken as larger; was "
                 "this unit calibrated? calibrate it again (gfimu calibrate)"
             )
         found, judged = self.remarks.get("disagreement"), self.remarks.get("consistency")

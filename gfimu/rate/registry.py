@@ -27,7 +27,7 @@ class RateMethod:
         Name for ``--method``, and in the result.
     solver : callable
         Estimates the rate at every sample: called with the array, times (n,) in s, readings (n, c) in m/s²,
-        `gfimu.SensorErrors` and `gfimu.rate.kalman.FilterSettings`, a recursive one also with ``gyro`` and
+        `gfimu.SensorErrors` and `gfimu.rate.settings.FilterSettings`, a recursive one also with ``gyro`` and
         ``progress`` by name (`gfimu.estimate_rate`), it returns a `gfimu.RateEstimate`.
     uses : str
         Part of the readings it uses.
@@ -58,13 +58,6 @@ class RateMethod:
             raise InputError(
                 f"--keep-faulty has no use with method {self.name!r}, which leaves no faulty channel out; "
                 f"use {recursive_methods()}"
-            )
-
-    def refuse_unknown_start(self) -> None:
-        """Raise `InputError` unless the method can start from an unknown rate."""
-        if not self.recursive:
-            raise InputError(
-                f"method {self.name!r} needs the rate at the start; use {recursive_methods()} for an unknown one"
             )
 
 

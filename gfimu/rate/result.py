@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,13 @@ from gfimu.base.results import Panel, PlottedResult, Series, axis_series
 from gfimu.base.short_repr import joined
 from gfimu.recording.sample_times import timing
 
-__all__ = ["DECIDED", "ChannelReport", "RateEstimate", "SignDecision", "clear_of_zero", "full_covariance", "undecided"]
+if TYPE_CHECKING:
+    from gfimu.rate.start import Start
+
+__all__ = [
+    "DECIDED", "ChannelReport", "RateEstimate", "SignDecision", "clear_of_zero", "full_covariance", "joined_estimates",
+    "undecided",
+]  # fmt: skip
 
 DECIDED = 0.99
 """Probability from which the sign of a rate counts as decided."""
@@ -117,6 +123,10 @@ class RateEstimate(PlottedResult):
     nis : ndarray, shape (n,)
         Normalised innovation squared of each sample; with a right model χ² with ``nis_dof`` degrees of freedom.
         For methods without innovations: the normalised residual squared, NaN where there is none.
+    stated_nis : ndarray, shape (n,), or None
+        The same by the noise as stated, or as measured where the channels agree, before ``scale`` enlarges it.
+    start : Start or None
+        How the run starts, as inferred.
     nis_dof : ndarray of int, shape (n,)
         Degrees of freedom of ``nis``; zero where nothing was compared.
     rest : ndarray of bool, shape (n,)
@@ -131,7 +141,7 @@ class RateEstimate(PlottedResult):
         Channels left out, gaps bridged.
     scale : ndarray, shape (n,), or None
         s̃, by which standard deviations were multiplied because the channels disagree more than their stated noise
-        (`gfimu.rate.disagreement`); ``covariance`` has it already, ``nis`` has not. None where it was not measured.
+        (`gfimu.rate.disagreement`); ``covariance`` and ``nis`` have it already. None where it was not measured.
     sign_probability : ndarray, shape (n,), or None
         Probability that ``omega`` and not ``−omega`` is the rate; one half at rest, where the sign means nothing. None
         where the sign was never in doubt.
@@ -161,6 +171,8 @@ class RateEstimate(PlottedResult):
     channels: ChannelReport = field(default_factory=ChannelReport)
     scale: NDArray[np.float64] | None = None
     sign_probability: NDArray[np.float64] | None = None
+    stated_nis: NDArray[np.float64] | None = None
+    start: Start | None = None
     unit: str = "rad/s"
     format_version: int = 1
 
@@ -246,3 +258,12 @@ def undecided(
 def full_covariance(packed: NDArray[np.float64]) -> NDArray[np.float64]:
     """Symmetric matrices (n, 3, 3) from their elements xx, yy, zz, xy, xz, yz, shape (n, 6)."""
     return packed[:, [0, 3, 4, 3, 1, 5, 4, 5, 2]].reshape(-1, 3, 3)
+
+
+def joined_estimates(parts: Sequence[RateEstimate]) -> RateEstimate:
+    """Join estimates of consecutive samples; what is said of the run as a whole is that of the last part."""
+    if len(parts) == 1:
+        return parts[0]
+    columns = ("t_s", "omega", "covariance", "nis", "nis_dof", "rest", "scale", "sign_probability", "stated_nis")
+    joined: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in parts]) for name in columns}
+    return replace(parts[-1], **joined)

@@ -51,12 +51,19 @@ class SensorErrors:
         Uncertainty of the constant bias of each channel before the run, m/s².
     scale_std : float
         Uncertainty of the scale factors, a ratio (0.01 is 1 %).
+    axis_std : float
+        Uncertainty of the directions of the channels, each by itself, rad.
+    rotation_std : float
+        Uncertainty of the direction of all chips together against the drawing, rad: what poses of a calibration can't
+        see.
     placement_std : float
         Uncertainty of the positions, m.
     timing_std : float
         How far a channel's sampling times are from the stated ones, independently from sample to sample, s.
     full_range : ndarray, shape (c,)
         Readings at or beyond ± this are saturated, m/s².
+    coarse_step : float
+        Step of the readings where it is coarse beside the noise, m/s²; 0 where it is not.
     stuck_after : int
         So many equal readings in a row mean that a channel is stuck; 0 switches the check off.
     gyro_noise_std : float
@@ -75,9 +82,12 @@ class SensorErrors:
     noise_std: NDArray[np.float64]
     bias_std: NDArray[np.float64]
     scale_std: float = 0.0
+    axis_std: float = 0.0
+    rotation_std: float = 0.0
     placement_std: float = 0.0
     timing_std: float = 0.0
     full_range: NDArray[np.float64] | None = None
+    coarse_step: float = 0.0
     stuck_after: int = 0
     gyro_noise_std: float = 0.005
     gyro_bias_std: float = 0.35
@@ -91,7 +101,16 @@ class SensorErrors:
                 raise InputError(f"{name} must hold one number per channel, none negative or above {_LARGEST:g} m/s²")
         if np.any(self.noise_std <= 0):
             raise InputError("noise_std must be positive for every channel; a real sensor has noise, m/s²")
-        for name in ("scale_std", "placement_std", "timing_std", "gyro_noise_std", "gyro_bias_std"):
+        for name in (
+            "scale_std",
+            "axis_std",
+            "rotation_std",
+            "placement_std",
+            "timing_std",
+            "coarse_step",
+            "gyro_noise_std",
+            "gyro_bias_std",
+        ):
             if not 0 <= getattr(self, name) <= _LARGEST:
                 raise InputError(f"{name} = {getattr(self, name)!r}: must be a number ≥ 0, at most {_LARGEST:g}")
 
@@ -134,7 +153,11 @@ class SensorErrors:
         each = np.maximum(np.concatenate(steps), step)
         noise = [np.sqrt(rms**2 + each**2 / 12.0)]
         stuck = _equal_run(float((rms / each).min()))
-        fields: dict[str, Any] = {"full_range": np.concatenate(limit), "stuck_after": stuck} | others
+        fields: dict[str, Any] = {
+            "full_range": np.concatenate(limit),
+            "stuck_after": stuck,
+            "coarse_step": 0.0 if stuck else float(each.max()),
+        } | others
         if "noise_std" in fields:
             white = np.broadcast_to(np.asarray(fields.pop("noise_std"), dtype=float), (array.n_channels,))
             noise = [np.sqrt(white**2 + each**2 / 12.0)]
@@ -142,18 +165,65 @@ class SensorErrors:
             bias = [np.broadcast_to(np.asarray(fields.pop("bias_std"), dtype=float), (array.n_channels,))]
         return cls(np.concatenate(noise), np.concatenate(bias), **fields)
 
+    @classmethod
+    def of_recording(
+        cls,
+        array: AccelerometerArray,
+        metadata: Mapping[str, Any],
+        sample_rate: float,
+        *,
+        step: float = 0.0,
+        **others: Any,
+    ) -> SensorErrors:
+        """Take the errors that a recording's metadata state after a calibration, else those of the data sheets.
+
+        A calibration states what it leaves of biases, gains, axes and positions. Directions that its poses left open
+        are as uncertain as the parts' axes: those of each chip, or of all together their mean. Parameters are those of
+        `from_parts`.
+        """
+        errors = cls.from_parts(array, sample_rate, step=step, **others)
+        bias = calibrated_bias_std(metadata, array)
+        if bias is None:
+            return errors.with_part_gains(array)
+        stated = metadata.get("calibration_std")
+        left: Mapping[str, Any] = stated if isinstance(stated, Mapping) else {}
+        scale, axis, place = (left.get(key, 0.0) for key in ("scale", "axis_rad", "placement_m"))
+        if not all(isinstance(size, int | float) and 0.0 <= size <= _LARGEST for size in (scale, axis, place)):
+            raise InputError(f"calibration_std in the recording's metadata is {left!r}; it holds numbers ≥ 0")
+        turned = left.get("turned", "all")
+        return replace(
+            errors,
+            bias_std=errors.bias_std if "bias_std" in others else bias,
+            scale_std=scale,
+            axis_std=float(np.hypot(axis, _turn_of_chips(array))) if turned == "each" else axis,
+            rotation_std=_turn_of_chips(array) / np.sqrt(len(array.chips)) if turned == "all" else 0.0,
+            placement_std=place,
+        )
+
     def with_part_gains(self, array: AccelerometerArray) -> Self:
         """Return the errors of channels that were not calibrated: gains and axes as sure as the data sheets say."""
         parts = [PartFile.load(chip.part, array.part_files) for chip in array.chips]
-        typical = max(
-            np.hypot(part.sensitivity_std, np.hypot(part.cross_axis_std, part.misalignment_std_rad)) for part in parts
-        )
-        return replace(self, scale_std=max(self.scale_std, float(typical)))
+        gain = max(part.sensitivity_std for part in parts)
+        axis = max(float(np.hypot(part.cross_axis_std, part.misalignment_std_rad)) for part in parts)
+        return replace(self, scale_std=max(self.scale_std, gain), axis_std=max(self.axis_std, axis))
+
+    def of_channels(self, kept: NDArray[np.bool_]) -> Self:
+        """Return the errors of the channels marked in ``kept`` (c,) alone."""
+        limits = None if self.full_range is None else self.full_range[kept]
+        return replace(self, noise_std=self.noise_std[kept], bias_std=self.bias_std[kept], full_range=limits)
 
     @property
-    def white_only(self) -> bool:
-        """Whether no errors of gain, position or time are stated beside white noise and bias."""
-        return self.scale_std == self.placement_std == self.timing_std == 0.0
+    def gain_std(self) -> float:
+        """Uncertainty of a reading in proportion to the specific force, along the channel and across."""
+        return float(np.hypot(self.scale_std, self.axis_std))
+
+    def noise_at_rest(self, noise_std: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the largest noise (c,) that channels of noise ``noise_std`` (c,), m/s², may have at rest.
+
+        A channel that rests between two coarse steps reads either, with a variance of up to a fourth of the step²
+        instead of a twelfth.
+        """
+        return np.asarray(np.sqrt(noise_std**2 + self.coarse_step**2 / 6.0))
 
     @property
     def limits(self) -> NDArray[np.float64]:
@@ -171,6 +241,13 @@ def _equal_run(noise_in_lsb: float) -> int:
     # Two readings round to the same count with a probability of about 1/(2 √π σ), σ in LSB (at most near 1).
     probability = min(0.9, 1.0 / (2.0 * np.sqrt(np.pi) * max(noise_in_lsb, 1e-3)))
     return int(np.ceil(np.log(_EQUAL_READINGS) / np.log(probability))) + 1
+
+
+def _turn_of_chips(array: AccelerometerArray) -> float:
+    """Return how far the axes of a chip together are turned against the drawing, rad, one standard deviation."""
+    parts = [PartFile.load(chip.part, array.part_files) for chip in array.chips]
+    squares = [part.misalignment_std_rad**2 + part.cross_axis_std**2 / 2.0 for part in parts]
+    return float(np.sqrt(np.mean(squares)))
 
 
 class ChannelTables:

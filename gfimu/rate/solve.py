@@ -14,15 +14,14 @@ from numpy.typing import NDArray
 
 from gfimu.array.integration import integrate_rate
 from gfimu.rate.consistency import judge_consistency
-from gfimu.rate.disagreement import MeasuredNoise, sum_up_disagreement
+from gfimu.rate.disagreement import sum_up_disagreement
 from gfimu.rate.feedback import integrate_rate_recursively
-from gfimu.rate.kalman import FilterSettings
 from gfimu.rate.methods import estimate_rate
 from gfimu.rate.problem import RateProblem, RateSolution
 from gfimu.rate.registry import RateMethod
 from gfimu.rate.result import RateEstimate
-from gfimu.rate.sensing import SensorErrors, step_of_readings
-from gfimu.rate.start import START_S, contradicts_biases
+from gfimu.rate.sensing import SensorErrors
+from gfimu.rate.settings import FilterSettings
 
 __all__ = ["solve_rate"]
 
@@ -67,23 +66,17 @@ def _integrated_variance(t: NDArray[np.float64], variance: NDArray[np.float64]) 
 def _with_sensor_errors(method: RateMethod, problem: RateProblem) -> RateSolution:
     """Run a method of `gfimu.rate.registry` with the errors of the parts, and of the biases as a calibration states."""
     problem, names = _of_living_channels(problem)
-    rate = 1.0 / float(np.median(np.diff(problem.t_s)))
-    step = step_of_readings(problem.readings)
-    errors = SensorErrors.from_parts(problem.array, rate, step=step, noise_std=problem.noise_std)
-    other_biases = False
-    if problem.bias_std is not None:
-        calibrated = replace(errors, bias_std=problem.bias_std)
-        first = problem.readings[problem.t_s < problem.t_s[0] + START_S]
-        other_biases = contradicts_biases(problem.array, first, calibrated)
-        errors = errors if other_biases else calibrated
+    errors = problem.errors
     settings = FilterSettings(start_omega=problem.omega0)
     found = estimate_rate(
         problem.array, problem.t_s, problem.readings, errors, method=method.name, settings=settings,
         gyro=problem.gyro, progress=problem.progress,
     )  # fmt: skip
     disagreement = None if found.scale is None else sum_up_disagreement(found.scale, found.omega)
+    start = found.start
     remarks = {
-        "calibration_biases_contradicted": other_biases,
+        "calibration_biases_contradicted": problem.calibrated and start is not None and start.bias_factor > 1.0,
+        "start": None if start is None else start.to_dict(),
         "sign": found.sign.state,
         "sign_undecided_samples": int(found.sign_undecided.sum()),
         "disagreement": None if disagreement is None else disagreement.to_dict(),
@@ -121,9 +114,8 @@ def _of_living_channels(problem: RateProblem) -> tuple[RateProblem, dict[str, st
         return problem, {name: name for name in array.channels}
     chips = [replace(chip, axes=chip.axes[alive[array.chip_of_channel == k]]) for k, chip in enumerate(array.chips)]
     fewer = replace(array, chips=tuple(chip for chip in chips if len(chip.axes)))
-    readings, noise = problem.readings[:, alive], problem.noise_std[alive]
-    bias = None if problem.bias_std is None else problem.bias_std[alive]
-    reduced = replace(problem, array=fewer, readings=readings, noise_std=noise, bias_std=bias)
+    errors = problem.errors.of_channels(alive)
+    reduced = replace(problem, array=fewer, readings=problem.readings[:, alive], errors=errors)
     return reduced, dict(zip(fewer.channels, living, strict=True))
 
 
@@ -139,15 +131,14 @@ def _filter_again(
     problem: RateProblem, errors: SensorErrors, found: RateEstimate
 ) -> Callable[[slice, NDArray[np.float64]], RateEstimate]:
     """Return a filter of some rows with other readings that starts as the one before did, or from what it found."""
-    stated = MeasuredNoise.as_stated(problem.t_s)
 
     def run(rows: slice, readings: NDArray[np.float64]) -> RateEstimate:
         begins = rows.start == 0 or not np.isfinite(found.omega[rows.start]).all()
         if begins and problem.omega0 is not None:
-            settings = FilterSettings(start_omega=problem.omega0, noise=stated)
+            settings = FilterSettings(start_omega=problem.omega0, measure_noise=False)
         else:
             std = float(np.nan_to_num(found.std[rows.start]).max())
-            settings = FilterSettings(found.omega[rows.start], max(std, 1e-3), noise=stated)
+            settings = FilterSettings(found.omega[rows.start], max(std, 1e-3), measure_noise=False)
         gyro = None if problem.gyro is None else problem.gyro[rows]
         return estimate_rate(
             problem.array, problem.t_s[rows], readings, errors, method="filter", settings=settings, gyro=gyro

@@ -10,14 +10,12 @@ from typing import TYPE_CHECKING, Any
 from gfimu.base.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from numpy.typing import ArrayLike
 
     from gfimu.array.array import AccelerometerArray
-    from gfimu.rate.kalman import FilterSettings
     from gfimu.rate.result import RateEstimate
     from gfimu.rate.sensing import SensorErrors
+    from gfimu.rate.settings import FilterSettings
 
 __all__ = [
     "algebraic_from_rest",
@@ -35,49 +33,58 @@ def integrate_from_rest(
     import numpy as np
 
     from gfimu.array.integration import integrate_rate
-    from gfimu.rate.null_readings import null_readings
+    from gfimu.rate.filter import increasing_times
+    from gfimu.rate.live import LiveRateFilter
     from gfimu.rate.result import RateEstimate
-    from gfimu.rate.sensing import ChannelTables
 
-    if settings.start_omega is None:
-        raise InputError("an integration needs the rate at the start; give it as start_omega")
-    if ChannelTables(array, errors).alpha_leak[0].any():
+    times, period = increasing_times(t, "the integration")
+    live = LiveRateFilter(array, errors, period, settings)
+    if live.sets.full.leak.any():
         raise InputError(
             f"array {array.name!r} leaves products of the rate in α; use filter, or gfimu.estimate, which "
             "feeds the rate back"
         )
-    at_rest = not np.any(settings.start_omega)
-    null = null_readings(array, t, readings, errors, least_rank=0, start_at_rest=at_rest)
-    omega = integrate_rate(null.t, null.alpha, settings.start_omega)
-    noise = ChannelTables(array, errors).alpha_noise[0]
-    period = float(np.median(np.diff(null.t)))
-    turned = (null.t - null.t[0])[:, None, None]
-    spread = ChannelTables(array, errors).bias_covariance(errors.bias_std)[:3, :3]
-    if null.rest.any():
-        spread = noise / int(null.rest.sum())
-    covariance = settings.start_std**2 * np.eye(3) + noise * period * turned + spread * turned**2
-    n = len(null.t)
+    known = live.leading_rest(times, readings)
+    start, samples = live.start, live.samples
+    assert start is not None
+    of_alpha, slopes = known.of_alpha(samples)
+    alpha = np.where((samples.channel_set >= 0)[:, None], samples.alpha - of_alpha, np.nan)
+    omega = integrate_rate(times, alpha, start.omega)
+    first = start.covariance
+    if start.sign_open:  # the error is nought or twice the rate
+        first = first + 2.0 * np.outer(start.omega, start.omega)
+    steps = np.diff(times, prepend=times[0])
+    sums = np.cumsum(slopes * steps[:, None, None], axis=0)  # (n, 3, constants)
+    noise = live.sets.full.alpha_noise * (period * (times - times[0]))[:, None, None]
+    covariance = first + noise + sums @ known.covariance @ np.swapaxes(sums, 1, 2)
+    n = len(times)
+    none = np.zeros(n, dtype=np.int64)
+    chance = np.full(n, 0.5 if start.sign_open else 1.0)
     return RateEstimate(
-        "integrate", null.t, omega, covariance, np.full(n, np.nan), np.zeros(n, dtype=np.int64), null.rest
+        "integrate",
+        times,
+        omega,
+        covariance,
+        np.full(n, np.nan),
+        none,
+        known.rest,
+        sign_probability=chance,
+        start=start,
     )
 
 
-def algebraic_from_rest(
-    array: AccelerometerArray, t: ArrayLike, readings: ArrayLike, errors: SensorErrors, settings: FilterSettings
-) -> RateEstimate:
-    """Solve the products of ω sample by sample in closed form, with the mean over a leading rest as bias."""
-    from gfimu.rate.algebraic import algebraic_rate
+def algebraic_from_rest(*run: Any) -> RateEstimate:
+    """Solve the products of ω sample by sample, as `gfimu.rate.per_sample.algebraic_rate`."""
+    from gfimu.rate.per_sample import algebraic_rate
 
-    return _per_sample(algebraic_rate, array, t, readings, errors, settings)
+    return algebraic_rate(*run)
 
 
-def maximum_likelihood_from_rest(
-    array: AccelerometerArray, t: ArrayLike, readings: ArrayLike, errors: SensorErrors, settings: FilterSettings
-) -> RateEstimate:
-    """Solve ω sample by sample by maximum likelihood, with the mean over a leading rest as bias."""
-    from gfimu.rate.maximum_likelihood import maximum_likelihood_rate
+def maximum_likelihood_from_rest(*run: Any) -> RateEstimate:
+    """Solve ω sample by sample, as `gfimu.rate.per_sample.maximum_likelihood_rate`."""
+    from gfimu.rate.per_sample import maximum_likelihood_rate
 
-    return _per_sample(maximum_likelihood_rate, array, t, readings, errors, settings)
+    return maximum_likelihood_rate(*run)
 
 
 def filter_readings(*run: Any, **options: Any) -> RateEstimate:
@@ -88,28 +95,7 @@ def filter_readings(*run: Any, **options: Any) -> RateEstimate:
 
 
 def smooth_readings(*run: Any, **options: Any) -> RateEstimate:
-    """Smooth, as `gfimu.rate.smoother.smooth_rate`."""
-    from gfimu.rate.smoother import smooth_rate
+    """Smooth, as `gfimu.rate.filter.smooth_rate`."""
+    from gfimu.rate.filter import smooth_rate
 
     return smooth_rate(*run, **options)
-
-
-def _per_sample(
-    solve: Callable[..., RateEstimate],
-    array: AccelerometerArray,
-    t: ArrayLike,
-    readings: ArrayLike,
-    errors: SensorErrors,
-    settings: FilterSettings,
-) -> RateEstimate:
-    import numpy as np
-
-    from gfimu.rate.kalman import plausible_start
-    from gfimu.rate.per_sample import KnownStart
-
-    times, rows = np.asarray(t, dtype=float), np.asarray(readings, dtype=float)
-    settings = plausible_start(array, times, rows, errors, settings)
-    start = settings.start_omega
-    at_rest = start is not None and not np.any(start)
-    known = None if start is None or at_rest else KnownStart(start, settings.start_std)
-    return solve(array, t, readings, errors, start_at_rest=at_rest, start=known)

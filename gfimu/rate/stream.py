@@ -18,10 +18,10 @@ from gfimu.array.parts.plausible import largest_of_array
 from gfimu.base.declared import Declared, figure
 from gfimu.base.errors import InputError
 from gfimu.rate.health.live.watched_filter import WatchedRateFilter
-from gfimu.rate.kalman import FilterSettings
 from gfimu.rate.live import LiveRateFilter
 from gfimu.rate.result import RateEstimate
 from gfimu.rate.sensing import SensorErrors
+from gfimu.rate.settings import FilterSettings
 from gfimu.recording import Recording
 from gfimu.recording.checks import examine
 from gfimu.recording.quantities import GYRO_COLUMNS, READING_UNITS

@@ -249,7 +249,7 @@ def test_the_first_call_of_the_filter_says_that_it_compiles(monkeypatch):
     from gfimu.commands.estimate import _doing
     from gfimu.commands.known_axis import KnownAxis
     from gfimu.rate import first_call
-    from gfimu.rate.recursion import forward
+    from gfimu.rate.body_rate import follow
 
     def doing(method):
         return _doing({"axis": KnownAxis(), "method": method})
@@ -258,7 +258,7 @@ def test_the_first_call_of_the_filter_says_that_it_compiles(monkeypatch):
     assert "compiling" in doing("filter")
     assert "compiling" not in doing("integrate")
     monkeypatch.undo()
-    if forward.signatures:
+    if follow.signatures:
         assert not first_call.must_compile()
         assert doing("smoother") == "estimating by smoother"
 

@@ -34,7 +34,7 @@ from gfimu.motion.attitude import integrate_attitude, to_rotation
 from gfimu.motion.equivalent_errors import equivalent_p_bias, equivalent_rate_drift
 from gfimu.motion.navigation import level, navigate
 from gfimu.rate.sensing import SensorErrors, calibrated_bias_std
-from gfimu.rate.start import contradicts_rest
+from gfimu.rate.start import start_of_still
 from gfimu.recording import Recording
 from gfimu.recording.rest import detect_rest
 from gfimu.sensor_noise import RecordingNoise, recording_noise
@@ -402,7 +402,7 @@ def _refuse_spin(recording: Recording, array: AccelerometerArray, leads: list[Fl
     known = calibrated_bias_std(recording.metadata, array)
     errors = SensorErrors.from_parts(array, recording.sample_rate)
     errors = errors if known is None else replace(errors, bias_std=known)
-    if any(contradicts_rest(array, lead, errors) for lead in leads):
+    if any(start_of_still(array, lead, errors).kind == "spin" for lead in leads):
         raise InputError(
             "the array turns steadily in what looks like a rest: its null space shows products of the rate; record it "
             "standing still, or check its biases (gfimu calibrate array)"

@@ -78,7 +78,11 @@ SPLIT = Option("Worlds to develop on (dev), or those of the published table (tes
 TABLE = Option("Table, topic or member of a file that holds several.", "NAME", panel=FOREIGN)
 TIME_LIMIT = Option("Real time to spend at most, s", "S")
 TWIN = _named("Twin, what the simulation assumes: a name, or a twin file (.toml).", "TWIN", completion.twins)
-UNKNOWN_START = Option("The body may turn already when the run begins")
+STARTS = ("any", "rest")
+START = Option(
+    "How the body starts: any (inferred from the first readings) or rest.", "START",
+    offers=STARTS,
+)  # fmt: skip
 WORKERS = Option("Processes to work in; by default one per processor", "N")
 
 

@@ -20,6 +20,7 @@ from gfimu.rate.axis.mirror import MirrorTest
 from gfimu.rate.axis.mounting import Mounting
 from gfimu.rate.axis.problem import AxisProblem, Settings
 from gfimu.rate.axis.recursion import filter_axis
+from gfimu.rate.rest_test import begins_still
 from gfimu.rate.stream import LiveSample, SkippedLine, stream_samples
 
 __all__ = ["AxisSample", "LiveAxisFilter", "LiveAxisSettings", "axis_stream"]
@@ -119,7 +120,8 @@ class LiveAxisFilter:
     rate_hz : float
         Nominal sample rate, Hz.
     at_rest : bool
-        Whether the body is at rest at the first sample; else both signs of the rate are followed until one is clear.
+        Whether the body is at rest at the first sample, else both signs of the rate are followed until one is clear;
+        by default whether the readings of the first half second are still.
 
     Raises
     ------
@@ -127,7 +129,9 @@ class LiveAxisFilter:
         If the array can't see the rotation.
     """
 
-    def __init__(self, array: AccelerometerArray, axis: TurningAxis, rate_hz: float, *, at_rest: bool = True) -> None:
+    def __init__(
+        self, array: AccelerometerArray, axis: TurningAxis, rate_hz: float, *, at_rest: bool | None = None
+    ) -> None:
         require_visible(array, axis)
         self.array, self.axis, self.settings = array, axis, LiveAxisSettings()
         self._at_rest = at_rest
@@ -139,6 +143,7 @@ class LiveAxisFilter:
         self._last = -np.inf
         self._spread = 1.0
         self._clear = False
+        self._period = 1.0 / rate_hz
         self._sign = "decided" if at_rest else "undecided"
 
     def push(self, t: float, readings: NDArray[np.float64]) -> list[AxisSample]:
@@ -178,6 +183,9 @@ class LiveAxisFilter:
         """Choose the start by the samples that waited, and filter these."""
         waiting, self._waiting = self._waiting, []
         t, y = np.array([one for one, _ in waiting]), np.array([one for _, one in waiting])
+        if self._at_rest is None:
+            self._at_rest = begins_still(y, self._noise, self._period)
+            self._sign = "decided" if self._at_rest else "undecided"
         self._numbers, covariance = first_settings(y, self._channels, self.axis, self._noise, at_rest=self._at_rest)
         tilt = self._numbers.inclination
         self._mounting = Mounting.of(self.array, replace(self.axis, inclination=tilt), tilt, free_inclination=False)
@@ -257,7 +265,7 @@ class LiveAxisFilter:
 
 
 def axis_stream(
-    lines: Iterable[str], array: AccelerometerArray, axis: TurningAxis, rate_hz: float, *, at_rest: bool = True
+    lines: Iterable[str], array: AccelerometerArray, axis: TurningAxis, rate_hz: float, *, at_rest: bool | None = None
 ) -> Iterator[str]:
     """Filter a stream of CSV lines about a known axis, sample by sample: one JSON line each.
 

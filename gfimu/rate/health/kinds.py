@@ -191,6 +191,6 @@ def _seen(
         variance += _std_of_mean(difference[before], noise) ** 2
         difference = difference - float(np.mean(difference[before]))
     ranges = np.nan_to_num(np.nanmax(part, axis=0) - np.nanmin(part, axis=0)) if len(part) else np.zeros(len(row))
-    variance += float(np.sum((0.5 * errors.scale_std * ranges * row) ** 2))
+    variance += float(np.sum((0.5 * errors.gain_std * ranges * row) ** 2))
     after = times >= fault.onset_s
     return _Seen(times[after], part[after, channel], difference[after], noise, float(np.sqrt(variance)))

@@ -26,7 +26,8 @@ def with_residue(array: AccelerometerArray, errors: SensorErrors, policy: Monito
     return replace(
         errors,
         bias_std=np.full(array.n_channels, policy.bias_std),
-        scale_std=max(errors.scale_std, policy.gain_std),
+        scale_std=max(errors.gain_std, policy.gain_std),
+        axis_std=0.0,
         placement_std=max(errors.placement_std, policy.place_std),
     )
 
@@ -37,7 +38,8 @@ def larger_errors(errors: SensorErrors, factor: float) -> SensorErrors:
         return errors
     return replace(
         errors,
-        scale_std=factor * max(errors.scale_std, _LEAST_SCALE),
+        scale_std=factor * max(errors.gain_std, _LEAST_SCALE),
+        axis_std=0.0,
         placement_std=factor * max(errors.placement_std, _LEAST_PLACE),
     )
 

@@ -13,6 +13,7 @@ from gfimu.rate.health.policy import MonitorPolicy
 from gfimu.rate.health.recursion.blocks import block_means, detrended_variance
 from gfimu.rate.rest_test import RestTest, constant_readings
 from gfimu.rate.sensing import SensorErrors
+from gfimu.rate.start import start_of_still
 
 __all__ = ["leading_rest", "leading_rest_bias", "rest_bias", "with_measured_noise"]
 
@@ -101,5 +102,7 @@ def leading_rest_bias(
     """Return the biases that a rest at the start shows, shape (c,), m/s²; None without one that is long enough."""
     length, _ = leading_rest(array, period, readings, errors)
     if length == 0 or length * period < policy.least_rest_s:
+        return None
+    if start_of_still(array, readings[:length], errors).kind == "spin":
         return None
     return rest_bias(array, readings[:length])

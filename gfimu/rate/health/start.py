@@ -68,19 +68,14 @@ class Settling:
 
     def start(self, live: LiveRateFilter) -> MotionStart | None:
         """Return rate and biases as a filter has them; None while it has not settled, or its sign is undecided."""
-        if not live.hypotheses or live.sign.state == "undecided":
+        if not live.started or len(live.carried) > 1:
             self._ratios = []
         if len(self._ratios) < 2 or self._ratios[1] < self._policy.settled_ratio * self._ratios[0]:
             return None
-        current = live.current
-        state, tables = current.state, current.tables
-        d = tables.n_null
-        seen = slice(3, 6 + d)  # biases of α and of the null space in the state
-        rows = np.vstack([tables.alpha_rows[0], tables.null_rows[0]])  # (3 + d, c)
-        back = np.linalg.pinv(rows)
-        covariance = back @ state.covariance[seen, seen] @ back.T  # (c, c)
+        bias, covariance = live.channel_biases()
         std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         if not std.max() < self._policy.settled_std:
             return None
-        rate_std = float(np.sqrt(max(0.0, np.linalg.eigvalsh(state.covariance[:3, :3])[-1])))
-        return MotionStart(current.omega, rate_std, back @ state.x[seen], std)
+        carried = live.carried[0]
+        rate_std = float(np.sqrt(max(0.0, np.linalg.eigvalsh(carried.covariance[:3, :3])[-1])))
+        return MotionStart(carried.x[:3].copy(), rate_std, bias, std)

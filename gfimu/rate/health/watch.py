@@ -18,9 +18,9 @@ from gfimu.rate.health.recursion.blocks import block_means
 from gfimu.rate.health.residue import agree, larger_errors, with_residue, without_noisy_channel
 from gfimu.rate.health.rest import leading_rest_bias, with_measured_noise
 from gfimu.rate.health.start import Settling
-from gfimu.rate.kalman import FilterSettings
 from gfimu.rate.live import LiveRateFilter
 from gfimu.rate.sensing import SensorErrors
+from gfimu.rate.settings import FilterSettings
 
 __all__ = ["watch_channels", "watch_from_rest", "watch_in_motion"]
 

@@ -52,6 +52,15 @@ def test_first_rest_takes_the_bias_of_p_off():
     assert np.abs(found.position[-1]).max() < 1e-9
 
 
+def test_samples_of_a_rest_without_attitude_are_left_out():
+    p, attitude = world()
+    whole = navigate_with_rest(T, p, attitude, REST)
+    attitude[50:53] = np.nan
+    found = navigate_with_rest(T, p, attitude, REST)
+    np.testing.assert_allclose(found.quaternion[-1], whole.quaternion[-1], atol=1e-12)
+    np.testing.assert_allclose(found.velocity[-1], whole.velocity[-1], atol=1e-12)
+
+
 def test_bad_shapes():
     p, attitude = world()
     with pytest.raises(InputError, match="one row per time"):

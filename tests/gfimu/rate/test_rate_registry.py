@@ -60,11 +60,9 @@ def test_an_unknown_method_is_one_line_with_the_list(ask):
 
 
 @pytest.mark.parametrize("name", [name for name, method in RATE_METHODS.items() if not method.recursive])
-def test_only_recursive_methods_take_a_gyro_or_an_unknown_start(run, name):
+def test_only_recursive_methods_take_a_gyro(run, name):
     with pytest.raises(InputError, match=f"^method '{name}' can't use a gyro; use filter or smoother$"):
         estimate(run, CUBE, method=name, fuse_gyro=True)
-    with pytest.raises(InputError, match=f"^method '{name}' needs the rate at the start; use filter or smoother for"):
-        estimate(run, CUBE, method=name, omega0=None)
 
 
 def turning_at_one(array, t, readings, errors, settings):

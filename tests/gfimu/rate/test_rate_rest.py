@@ -9,11 +9,19 @@ import pytest
 from rate_worlds import GRAVITY, Motion, cube, measure, sensor_errors, smooth_step, total_noise_std, turntable
 
 from gfimu import InputError, LiveRateFilter
-from gfimu.rate import ChannelTables, FilterSettings, RestTest, constant_readings, filter_rate, smooth_rate
+from gfimu.rate import (
+    ChannelSets,
+    FilterSettings,
+    RestTest,
+    constant_readings,
+    filter_rate,
+    joined_estimates,
+    smooth_rate,
+)
 
 ARRAY = cube(0.1)
 RATE = 100.0
-TABLES = ChannelTables(ARRAY, sensor_errors(ARRAY, RATE))
+FULL = ChannelSets(ARRAY, total_noise_std(ARRAY, RATE)).full
 
 
 def still(duration):
@@ -29,8 +37,7 @@ def test_blocks_at_rest_are_recognised_at_the_stated_rate():
         noise = total_noise_std(ARRAY, RATE)
         passed = constant_readings(ARRAY, values, np.sqrt(noise**2 - (0.0039 * GRAVITY) ** 2 / 12), 1 / RATE)
         missed += np.count_nonzero(~passed.reshape(-1, 50)[:, 0])
-    # Two of the five statistics, 4000 blocks: 16 expected; within four standard deviations of Poisson.
-    assert abs(missed - 4000 * RestTest().false_alarm * 2 / 5) < 4 * 4
+    assert missed <= 4000 * RestTest().false_alarm * 2  # scatter and halves, each with a margin
 
 
 def test_a_rest_is_not_lost_to_blocks_that_fail_by_chance():
@@ -42,47 +49,49 @@ def test_a_rest_is_not_lost_to_blocks_that_fail_by_chance():
         recognised = filter_rate(ARRAY, motion.t, values, sensor_errors(ARRAY, RATE)).rest.reshape(-1, 50)[:, 0]
         doubted += np.count_nonzero(~recognised)
         lost += not np.convolve(recognised, np.ones(5), "valid").all()  # five in a row that are none
-    assert 0 < doubted < 4000 * RestTest().false_alarm
-    assert lost <= 3  # 0.4 expected; more in less than one case in a thousand
+    assert 0 < doubted < 4000 * 2 * RestTest().alpha_false_alarm
+    assert lost <= 3
 
 
 def accelerated(blocks, deviations):
     """A rest, with a mean α in ``blocks`` of so many of its standard deviations."""
     motion = still(15.0)
     values = measure(ARRAY, motion, np.random.default_rng(8))
-    size = deviations * np.sqrt(TABLES.alpha_noise[0, 2, 2] / 50)
+    size = deviations * np.sqrt(FULL.alpha_noise[2, 2] / 50)
     alpha = np.zeros((len(motion.t), 3))
     for block in blocks:
         rows = slice(50 * block, 50 * (block + 1))
-        alpha[rows, 2] = size - (values[rows] - values[:500].mean(axis=0)).mean(axis=0) @ TABLES.alpha_rows[0, 2]
+        alpha[rows, 2] = size - (values[rows] - values[:500].mean(axis=0)).mean(axis=0) @ FULL.alpha_rows[2]
     for number, chip in enumerate(ARRAY.chips):
         values[:, 3 * number : 3 * number + 3] += np.cross(alpha, chip.position) @ chip.axes.T
     return filter_rate(ARRAY, motion.t, values, sensor_errors(ARRAY, RATE)).rest.reshape(-1, 50)[:, 0]
 
 
-def test_one_failed_block_is_a_doubt_and_two_in_a_row_end_the_rest():
+def test_one_failed_block_is_a_doubt_and_two_in_a_row_doubt_the_ones_before():
     assert accelerated([20], 0.0).all()
-    doubted = accelerated([20], 4.5)
+    doubted = accelerated([20], 3.8)
     assert not doubted[20]
-    assert doubted[22:].all()
-    assert not accelerated([20, 21], 4.5)[20:24].any()
+    assert doubted[[18, 19, 21, 22]].all()
+    assert not accelerated([20, 21], 3.8)[19:22].any()
 
 
-def test_a_significant_failure_ends_a_rest_at_once():
-    assert not accelerated([20], 6.5)[20:23].any()
+def test_a_significant_failure_ends_a_rest_and_takes_two_blocks_before_with_it():
+    found = accelerated([20], 6.5)
+    assert found[:18].all()
+    assert not found[18:23].any()
 
 
 def test_rest_holds_the_rate_and_ends_with_the_motion():
     motion = turntable(RATE, 2 * np.pi)
     found = filter_rate(ARRAY, motion.t, measure(ARRAY, motion, np.random.default_rng(0)), sensor_errors(ARRAY, RATE))
-    assert found.rest[motion.t < 1.99].mean() > 0.99
+    assert found.rest[motion.t < 1.0].all()
     assert not found.rest[np.linalg.norm(motion.omega, axis=1) > 0.1].any()
     without = filter_rate(
         ARRAY, motion.t, measure(ARRAY, motion, np.random.default_rng(0)), sensor_errors(ARRAY, RATE),
         FilterSettings(rest=None),
     )  # fmt: skip
     rows = slice(100, 200)
-    assert np.abs(found.omega[rows]).max() < 0.1 < np.abs(without.omega[rows]).max()
+    assert without.std[rows].max() > 1.5 * found.std[rows].max()
 
 
 def test_rest_begins_again_after_a_motion():
@@ -101,47 +110,43 @@ def test_rest_begins_again_after_a_motion():
     assert np.abs(found.omega[t > 18]).max() < 0.06
 
 
-def test_a_departure_too_slow_for_one_block_is_taken_back():
+def test_a_departure_too_slow_for_one_block_is_no_rest():
     """0.1 rev/s reached within 3 s: a second after the start the rate is 0.12 rad/s and its α not yet significant."""
     array = cube()
     motion = turntable(RATE, 2 * np.pi * 0.1, duration=6.0)
     errors = sensor_errors(array, RATE)
     moving = (motion.t > 2.6) & (motion.t < 2.99)
-    believed, kept, squares = 0, 0, []
+    squares = []
     for seed in range(20):
         values = measure(array, motion, np.random.default_rng([5, seed]))
-        found = filter_rate(array, motion.t, values, errors)
-        believed += found.rest[moving].any()
-        kept += smooth_rate(array, motion.t, values, errors).rest[moving].any()
-        squares.append(((found.omega - motion.omega) / found.std)[350:])
-    assert believed > 5
-    assert kept == 0
+        for solve in (filter_rate, smooth_rate):
+            found = solve(array, motion.t, values, errors)
+            assert not found.rest[moving].any()
+            squares.append(((found.omega - motion.omega) / found.std)[350:])
     # 20 runs with 3 axes, each about one independent error: three standard deviations of the mean square.
     assert np.mean(np.square(squares)) < 1 + 3 * np.sqrt(2 / 60)
 
 
-def test_taking_back_is_the_same_live_and_in_blocks():
+def test_rest_is_the_same_live_and_in_blocks():
     array = cube()
     motion = turntable(RATE, 2 * np.pi * 0.1, duration=6.0)
     values = measure(array, motion, np.random.default_rng([5, 0]))
     whole, live = (LiveRateFilter(array, sensor_errors(array, RATE), 1 / RATE) for _ in range(2))
-    block = [whole.push(motion.t, values), whole.finish()]
-    single = [live.push(time, row) for time, row in zip(motion.t, values, strict=True)] + [live.finish()]
-    for name in ("omega", "covariance"):
-        one, other = (np.concatenate([getattr(part, name) for part in parts]) for parts in (block, single))
-        np.testing.assert_allclose(other, one, rtol=0, atol=1e-12)
-    std = np.concatenate([part.std for part in block]).max(axis=1)
-    assert (std[1:] / std[:-1])[200:400].max() > 1.5  # the uncertainty of the blocks taken back
+    block = joined_estimates([whole.push(motion.t, values), whole.finish()])
+    each = [live.push(time, row) for time, row in zip(motion.t, values, strict=True)] + [live.finish()]
+    single = joined_estimates([part for part in each if len(part)])
+    for name in ("t_s", "omega", "covariance"):
+        np.testing.assert_allclose(getattr(single, name), getattr(block, name), rtol=0, atol=1e-7)  # of a fit
 
 
-def test_rest_resumes_soon_after_a_single_block_that_was_none():
+def test_rest_resumes_after_a_single_block_that_was_none():
     motion = still(15.0)
     values = measure(ARRAY, motion, np.random.default_rng(3))
     values[500:550] += 0.2 * np.sin(np.arange(50.0))[:, None]  # a knock on the table: no turning
     found = filter_rate(ARRAY, motion.t, values, sensor_errors(ARRAY, RATE))
-    assert found.rest[450:500].all()
-    assert not found.rest[500:600].any()
-    assert found.rest[710:].mean() > 0.9
+    assert found.rest[350:400].all()
+    assert not found.rest[500:550].any()
+    assert found.rest[1000:].mean() > 0.9  # four seconds later
 
 
 def test_steady_turning_about_the_vertical_is_not_rest():
@@ -154,14 +159,15 @@ def test_steady_turning_about_the_vertical_is_not_rest():
     assert not found.rest[steady].any()
 
 
-def test_a_start_at_rest_that_is_none_leaves_the_sign_in_doubt():
+def test_a_start_in_motion_is_known_for_one():
     motion = turntable(RATE, 2 * np.pi, duration=10.0)
     late = Motion(*(column[350:] for column in (motion.t, motion.omega, motion.alpha, motion.p)))
     found = filter_rate(ARRAY, late.t, measure(ARRAY, late, np.random.default_rng(0)), sensor_errors(ARRAY, RATE))
-    assert found.sign.state == "undecided"
+    assert found.start.kind == "motion"
+    assert found.start.rest_probability == 0.0
 
 
-@pytest.mark.parametrize("field", ["false_alarm", "loss", "window_s", "rate_std", "entry_s", "retry_s"])
+@pytest.mark.parametrize("field", ["false_alarm", "window_s", "rate_std", "entry_s"])
 def test_settings_are_checked(field):
     with pytest.raises(InputError, match=field):
         replace(RestTest(), **{field: -1.0})

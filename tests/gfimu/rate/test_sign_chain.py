@@ -31,6 +31,9 @@ def test_steady_turning_has_no_sign(bias, direction, speed):
     for seed in range(3):
         values = measure(cube(), motion, np.random.default_rng(seed), bias=bias)
         found = estimate_rate(cube(), motion.t, values, errors, method="ml", settings=DARK)
+        if found.start.kind == "rest":  # too slow to be told from biases: that much is stated
+            assert found.start.least_spin > 2 * np.pi * speed
+            continue
         assert found.sign_probability.max() < 0.9
         assert found.sign.state == "undecided"
 

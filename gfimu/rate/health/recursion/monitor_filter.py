@@ -70,7 +70,7 @@ class MonitorFilter:
             walk=policy.bias_walk,
             forget=min(1.0, self.block_s / policy.range_memory_s),
             range_share=policy.range_share,
-            scale_std=errors.scale_std,
+            scale_std=errors.gain_std,
             placement_std=errors.placement_std,
             floor=policy.bias_std,
         )
@@ -184,7 +184,7 @@ class MonitorFilter:
             state.go_back(base)
         state.forget_onsets()
         if errors is not None:
-            tuning = tuning._replace(scale_std=errors.scale_std, placement_std=errors.placement_std)
+            tuning = tuning._replace(scale_std=errors.gain_std, placement_std=errors.placement_std)
         nis = np.zeros(count)
         self._run(
             state, blocks, everything, watched, tuning, base=base or 0,
@@ -196,7 +196,7 @@ class MonitorFilter:
     def reckon_with(self, errors: SensorErrors) -> None:
         """Reckon with other errors of gains, axes and positions from now on; onsets begin anew."""
         self.errors = errors
-        self._tuning = self._tuning._replace(scale_std=errors.scale_std, placement_std=errors.placement_std)
+        self._tuning = self._tuning._replace(scale_std=errors.gain_std, placement_std=errors.placement_std)
         self.state.forget_onsets()
 
     def evidence(

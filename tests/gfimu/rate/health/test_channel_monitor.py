@@ -177,8 +177,11 @@ def test_a_run_that_begins_in_motion_is_watched_once_the_rate_has_settled(kind):
 
 
 def test_a_run_whose_start_is_not_known_is_not_watched_while_its_sign_is_undecided():
-    t, y, _ = readings("turn", 11, duration=20.0)
-    assert watch_in_motion(CUBE, t[700:], y[700:], SensorErrors.from_parts(CUBE, RATE_HZ), omega0=None) is None
+    t, y, omega = readings("turn", 11, duration=20.0)
+    fastest = int(np.argmax(np.abs(omega[:, 2])))
+    noise = CALIBRATED.noise_std * np.random.default_rng(4).standard_normal((1300, 12))
+    steady = np.tile(y[fastest], (1300, 1)) + noise
+    assert watch_in_motion(CUBE, t[700:], steady, CALIBRATED, omega0=None) is None
 
 
 @pytest.mark.parametrize("kind", ["rest", "tumble"])
