@@ -113,9 +113,9 @@ def _solve(
     tracks = live.run_recording(times, readings, gyro, smooth=smooth)
     assert live.start is not None
     found = [live.estimate_of(times, out, method, index) for index, out in enumerate(tracks)]
-    signed = _signed(live, tracks, found)
-    _require_finite(array, signed)
-    return signed
+    for one in found:
+        _require_finite(array, one)
+    return _signed(live, tracks, found)
 
 
 def _signed(live: LiveRateFilter, tracks: list[Estimates], found: list[RateEstimate]) -> RateEstimate:
