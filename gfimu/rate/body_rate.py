@@ -3,7 +3,7 @@
 State x = [ω (3); ε (3); b_α (3); b_z (m); b_gyro (0 or 3); φ (q)]: behind ω and ε stand constants, of which the errors
 φ of a calibration are considered and not estimated. From sample k − 1 to k, Δt later,
 
-    ω ← ω + ∫α + ½ Δt (ε_{k−1} + ε_k) − Δt b_α − ½ Δt (L s(ω))_{k−1, k} − Δt (K b_z) − Δt A D φ − γ Δt S r    (1)
+    ω ← ω + ∫α + ½ Δt (ε_{k−1} + ε_k) − Δt b_α − ½ Δt (L s(ω))_{k−1, k} − Δt (K b_z) − ∫A D φ − γ Δt S r      (1)
 
 with the integral of α = A y by its neighbours, and the products L and biases K that a smaller set of channels leaves in
 it. ε is what the noise n of α does: half of it enters before the sample is measured and half after, the same noise
@@ -167,6 +167,7 @@ class Samples(NamedTuple):
     model_error: NDArray[np.float64]  # (N,) variance by errors of the sampling times over that of the noise
     features: NDArray[np.float64]  # (N, 12) of the motion, by this sample; (N, 0) where no errors are considered
     alpha_errors: NDArray[np.float64]  # (N, 3, q) A D
+    error_increment: NDArray[np.float64]  # (N, 3, q) ∫A D over the interval before
     product_errors: NDArray[np.float64]  # (N, m, q) Z D
 
 
@@ -375,7 +376,7 @@ def _step(samples, given, k, tables, tuning, carried, level, transition, added, 
         for b in range(3):
             noise[3 + a, 3 + b] = renewed * tables.alpha_noise[near, a, b]
         for j in range(tuning.errors_at, n):
-            transition[a, j] = -step * samples.alpha_errors[k, a, j - tuning.errors_at]
+            transition[a, j] = -samples.error_increment[k, a, j - tuning.errors_at]
     for end in range(2):  # what a smaller set, or an array that sees products in α, leaves in it: predicted first
         here = before if end == 0 else place
         if here >= 0 and not tables.plain[here]:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from gfimu.array.array import AccelerometerArray
 from gfimu.base.units import STANDARD_GRAVITY
-from gfimu.rate.channel_sets import ChannelSet, ChannelSets
+from gfimu.rate.channel_sets import ChannelSets
 from gfimu.rate.sensing import SensorErrors
 
 __all__ = ["ChannelErrors", "ErrorPolicy", "features_of", "usual_moments"]
@@ -102,12 +102,9 @@ class ChannelErrors:
         kept = vectors[:, matter][:, ::-1][:, : policy.most]
         return type(self)(np.einsum("qk,qcf->kcf", kept, self.patterns))
 
-    def of_motion(
-        self, channels: ChannelSet, features: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return A D and Z D of a set of channels at features (n, 12), shapes (n, 3, q) and (n, m, q)."""
-        alpha, z = channels.alpha_rows @ self.patterns, channels.product_rows @ self.patterns
-        return np.einsum("qaf,nf->naq", alpha, features), np.einsum("qmf,nf->nmq", z, features)
+    def of_rows(self, rows: NDArray[np.float64], features: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return what each makes of combinations (d, c) of the readings at features (n, 12), shape (n, d, q)."""
+        return np.asarray(np.einsum("qdf,nf->ndq", rows @ self.patterns, features))
 
     def covariance_of(self, rows: NDArray[np.float64], moments: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the mean covariance that rows (d, c) of the readings get in a motion with these moments, (d, d)."""

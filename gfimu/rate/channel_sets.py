@@ -152,6 +152,7 @@ class ChannelSets:
         self._basis = rows
         self.parity_rows = rows[self._products :]
         self._places: dict[bytes, int] = {}
+        self._tables: SetTables | None = None
         self.sets: list[ChannelSet] = []
         self.index(np.ones(array.n_channels, dtype=np.bool_))
 
@@ -170,6 +171,7 @@ class ChannelSets:
         key = present.tobytes()
         if key not in self._places:
             self._places[key] = len(self.sets)
+            self._tables = None
             self.sets.append(self._build(present))
         return self._places[key]
 
@@ -184,7 +186,9 @@ class ChannelSets:
 
     def tables(self) -> SetTables:
         """Return the sets met so far, stacked."""
-        return SetTables(*(np.stack([getattr(one, name) for one in self.sets]) for name in SetTables._fields))
+        if self._tables is None:
+            self._tables = SetTables(*(np.stack([getattr(one, key) for one in self.sets]) for key in SetTables._fields))
+        return self._tables
 
     def bias_covariance(self, channels: NDArray[np.float64]) -> NDArray[np.float64]:
         """Covariance of [b_α; b_z], shape (3 + m, 3 + m), of channel biases with the covariance (c, c), m²/s⁴."""

@@ -57,10 +57,6 @@ class DisagreementPolicy:
         s̃ from which a sample is reported.
     notable_share : float
         Share of such samples from which a run is reported.
-    again_share : float
-        Share of enlarged samples from which a filter runs again with the measured noise: ten times ``false_alarm``.
-    least_parity : int
-        Combinations of readings that no motion changes, from which a single sample shows the noise.
     """
 
     prior: float = 4.0
@@ -70,8 +66,6 @@ class DisagreementPolicy:
     long_false_alarm: float = 1e-6
     notable_ratio: float = 2.0
     notable_share: float = 0.05
-    again_share: float = 0.01
-    least_parity: int = 3
 
 
 POLICY = DisagreementPolicy()

@@ -21,7 +21,7 @@ def integrals(
     period: float,
     quadrature: str,
 ) -> NDArray[np.float64]:
-    """Integrate α over the interval before each sample, shape (n, 3), rad/s; zero for the first one.
+    """Integrate α, or what errors make of it, over the interval before each sample; zero for the first one.
 
     The polynomial through the neighbouring samples of the same set of channels is integrated. Beside a gap or another
     set the trapezoid is taken, and over a sample without α the last value is kept.
@@ -30,17 +30,22 @@ def integrals(
     ----------
     t : ndarray, shape (n,)
         Times, s.
-    alpha : ndarray, shape (n, 3)
-        Angular acceleration, rad/s²; in a sample without it the last one.
+    alpha : ndarray, shape (n, k)
+        Columns of angular acceleration, rad/s²; in a sample without it the last one.
     channel_set : ndarray, shape (n,)
         Set of channels of each sample; negative where it has no α.
     period : float
         Nominal sample period, s.
     quadrature : str
         A key of `gfimu.array.quadrature.STENCILS` whose stencil does not alternate.
+
+    Returns
+    -------
+    ndarray, shape (n, k)
+        Integrals, rad/s.
     """
     stencil = STENCILS[quadrature]
-    out = np.zeros((len(t), 3))
+    out = np.zeros(alpha.shape)
     _integrate(t, alpha, channel_set, period, -stencil.before[0], even_weights(stencil.points), out)
     return out
 
@@ -71,11 +76,11 @@ def _integrate(t, alpha, channel_set, period, position, even, out):  # type: ign
                     weights[j] = even[k - 1 - start, j] * step
             else:
                 polynomial_weights(t, start, points, k - 1, weights)
-            for a in range(3):
+            for a in range(alpha.shape[1]):
                 total = 0.0
                 for j in range(points):
                     total += weights[j] * alpha[start + j, a]
                 out[k, a] = total
         else:
-            for a in range(3):
+            for a in range(alpha.shape[1]):
                 out[k, a] = 0.5 * step * (alpha[k - 1, a] + alpha[k, a])

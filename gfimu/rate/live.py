@@ -39,7 +39,7 @@ from gfimu.rate.increments import integrals
 from gfimu.rate.kernel import Record
 from gfimu.rate.measured_noise import measured_noise, timing_noise
 from gfimu.rate.reduction import Reduction
-from gfimu.rate.rest_test import MOVES, RestJudge, RestTest, still_blocks
+from gfimu.rate.rest_test import MOVES, RESTS, RestJudge, RestTest, still_blocks
 from gfimu.rate.result import (
     DECIDED,
     ChannelReport,
@@ -159,11 +159,6 @@ class LiveRateFilter:
     def sign(self) -> SignDecision:
         """Whether the sign of the rate is certain, after the samples so far."""
         return self._sign
-
-    @property
-    def lag(self) -> int:
-        """Samples that must follow before an estimate appears."""
-        return self._ahead
 
     @property
     def report(self) -> ChannelReport:
@@ -363,10 +358,13 @@ class LiveRateFilter:
         samples, n = self._samples, len(self._samples.t)
         until = n if closing else max(self._done, n - self._ahead)
         low = max(0, self._done - _HISTORY)
-        samples.increment[self._done : n] = integrals(
-            samples.t[low:], samples.alpha[low:], samples.channel_set[low:], self.period, self.settings.quadrature
-        )[self._done - low :]
         self._reduction.add_errors(samples, max(0, self._done - self._ahead))
+        columns = np.concatenate([samples.alpha[low:, :, None], samples.alpha_errors[low:]], axis=2)
+        rates, quadrature = columns.reshape(n - low, -1), self.settings.quadrature
+        integrated = integrals(samples.t[low:], rates, samples.channel_set[low:], self.period, quadrature)
+        integrated = integrated.reshape(columns.shape)[self._done - low :]
+        samples.increment[self._done : n] = integrated[:, :, 0]
+        samples.error_increment[self._done : n] = integrated[:, :, 1:]
         self._judge_blocks(closing=closing)
         return until
 
@@ -377,10 +375,10 @@ class LiveRateFilter:
 
     def _judge_blocks(self, *, closing: bool) -> None:
         """Mark the blocks that are decided to be rest or not; filter again from the end of one that is decided anew."""
-        if self.settings.rest is None:
-            return
         window, samples = self._window, self._samples
         first = len(self._judge) * window - self._base
+        if self.settings.rest is None or (len(self._raw) - first < window and not closing):
+            return
         noise = self.errors.noise_at_rest(self.sets.noise_std)
         still = still_blocks(self._raw[first:], noise, self.period, self._test)
         alpha = samples.alpha[first : first + len(still) * window].reshape(-1, window, 3).mean(axis=1)
@@ -496,7 +494,7 @@ class LiveRateFilter:
         prior = self.carried[0].prior[BIASES : 9 + m, BIASES : 9 + m]
         if self._resumed:
             verdicts = self._samples.still[2 * window - 1 :: window]
-            rest[: (1 + int(np.argmin(np.append(verdicts, MOVES) != MOVES))) * window] = True
+            rest[: (1 + int(np.argmin(np.append(verdicts, MOVES) == RESTS))) * window] = True
         usable = np.where(np.abs(self._raw) < self.errors.limits, self._raw, np.nan)[rest]
         return LeadingRest(*self._learnt(prior, usable[np.isfinite(usable).all(axis=1)]), rest)
 
@@ -536,8 +534,7 @@ class LiveRateFilter:
         if not (len(considered) and len(readings)):
             return np.zeros((3 + self.sets.products, len(considered)))
         features = features_of(self.array, readings, np.ones(self.array.n_channels, dtype=np.bool_)).mean(axis=0)
-        of_alpha, of_z = considered.of_motion(full, features[None])
-        return np.vstack([of_alpha[0], of_z[0]])
+        return considered.of_rows(np.vstack([full.alpha_rows, full.product_rows]), features[None])[0]
 
     def _learnt(
         self, prior: NDArray[np.float64], readings: NDArray[np.float64]

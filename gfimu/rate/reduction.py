@@ -68,7 +68,7 @@ class Reduction:
         return Samples(
             t, np.zeros((n, m)), np.zeros((n, 3)), np.zeros((n, 3)), np.full((n, 2), np.nan),
             np.zeros(n, dtype=np.int64), np.full(n, np.nan), gyro, np.zeros(n, dtype=np.int64),
-            np.zeros(n), np.zeros((n, 12 if q else 0)), np.zeros((n, 3, q)), np.zeros((n, m, q)),
+            np.zeros(n), np.zeros((n, 12 if q else 0)), np.zeros((n, 3, q)), np.zeros((n, 3, q)), np.zeros((n, m, q)),
         )  # fmt: skip
 
     def reduce(
@@ -148,8 +148,8 @@ class Reduction:
     def add_errors(self, samples: Samples, first: int) -> None:
         """Fill in what the errors of the channels make of the samples from ``first`` on.
 
-        The motion of a sample is taken from its neighbours, by the parabola through two on either side, as its own
-        noise would look like an error of a gain.
+        The motion for the null space is taken from the neighbours of a sample, by the parabola through two on either
+        side, as its own noise would look like an error of a gain.
         """
         if not len(self.considered):
             return
@@ -163,8 +163,9 @@ class Reduction:
         for place in np.unique(samples.channel_set[first:]):
             if place >= 0:
                 here = samples.channel_set[first:] == place
-                of_alpha, of_z = self.considered.of_motion(self.sets.sets[place], motion[here])
-                samples.alpha_errors[rows[here]], samples.product_errors[rows[here]] = of_alpha, of_z
+                channels = self.sets.sets[place]
+                samples.alpha_errors[rows[here]] = self.considered.of_rows(channels.alpha_rows, features[first:][here])
+                samples.product_errors[rows[here]] = self.considered.of_rows(channels.product_rows, motion[here])
 
     def _add_timing(
         self,

@@ -96,7 +96,7 @@ def tuning_of(
     stencil = QUADRATURES[settings.quadrature]
     window = max(4, round(policy.guard_s / period)) if sees else 0
     test = settings.rest or RestTest()
-    forget = {name: _share(period, getattr(policy, name)) for name in ("innovation_s", "colour_s", "parity_s")}
+    half, second, parity = (_share(period, one) for one in (policy.innovation_s, policy.colour_s, policy.parity_s))
     return Tuning(
         period=period,
         overshoot=float(2.0 * np.sum(even_weights(stencil.points)[-stencil.before[0]] ** 2) - 1.0),
@@ -107,14 +107,14 @@ def tuning_of(
         entry_alpha=float(chdtri(3, test.entry_alpha_level)),
         rest_clear=policy.rest_clear,
         rest_entry=test.entry_blocks(period),
-        forget_second=forget["colour_s"],
-        forget_half=forget["innovation_s"],
-        forget_parity=forget["parity_s"],
-        excess_limit=1.0 + policy.significance * _spread(forget["innovation_s"], m),
-        parity_limit=policy.significance * _spread(forget["parity_s"], d),
+        forget_second=second,
+        forget_half=half,
+        forget_parity=parity,
+        excess_limit=1.0 + policy.significance * _spread(half, m),
+        parity_limit=policy.significance * _spread(parity, d),
         parity_alone=float(chdtri(max(d, 1), policy.parity_false_alarm)) / max(d, 1),
         parity_freedom=float(d),
-        lag_limit=policy.colour_significance * _spread(forget["colour_s"], 2 * m),
+        lag_limit=policy.colour_significance * _spread(second, 2 * m),
         guard_window=window,
         guard_limit=policy.guard_significance * np.sqrt(2.0 * m * window),
         guard_clear=policy.guard_clear,
