@@ -12,6 +12,5 @@ if TYPE_CHECKING:
     from gfimu.motion.attitude import ATTITUDE_METHODS, from_rotation, table_angle, to_rotation
     from gfimu.motion.axis_estimation import estimate_about_axis
     from gfimu.motion.body_drive import BodyDrive
-    from gfimu.motion.rest_navigation import navigate_with_rest
 else:
     __getattr__, __dir__, __all__ = declared_names(__name__)

@@ -27,15 +27,22 @@ _HEALTH = "health_"
 _SIGN = "omega_sign_probability"
 _VECTOR_COLUMNS: dict[str, tuple[str, ...]] = {
     "p": tuple(f"p_{axis}_m_s2" for axis in _AXES),
+    "p_std": tuple(f"p_{axis}_std_m_s2" for axis in _AXES),
     "alpha": tuple(f"alpha_{axis}_rad_s2" for axis in _AXES),
+    "alpha_std": tuple(f"alpha_{axis}_std_rad_s2" for axis in _AXES),
     "omega": tuple(f"omega_{axis}_rad_s" for axis in _AXES),
     "omega_std": tuple(f"omega_{axis}_std_rad_s" for axis in _AXES),
     "quaternion": ("q_w", "q_x", "q_y", "q_z"),
+    "attitude_std": tuple(f"attitude_{axis}_std_rad" for axis in _AXES),
     "omega_products": tuple(f"omega_{pair}_rad2_s2" for pair in OMEGA_PRODUCTS),
     "omega_products_std": tuple(f"omega_{pair}_std_rad2_s2" for pair in OMEGA_PRODUCTS),
     "velocity": tuple(f"velocity_{axis}_m_s" for axis in _AXES),
+    "velocity_std": tuple(f"velocity_{axis}_std_m_s" for axis in _AXES),
     "position": tuple(f"position_{axis}_m" for axis in _AXES),
+    "position_std": tuple(f"position_{axis}_std_m" for axis in _AXES),
 }
+_OPTIONAL = ("p_std", "alpha_std", "attitude_std", "velocity", "velocity_std", "position", "position_std")
+_ANGLE, _ANGLE_STD = "angle_rad", "angle_std_rad"
 
 
 @dataclass(frozen=True)
@@ -47,9 +54,9 @@ class Estimate(PlottedResult):
     t_s : ndarray, shape (n,)
         Sample times, s.
     p : ndarray, shape (n, 3)
-        Specific force of the body origin, body axes, m/s².
+        Specific force of the body origin, body axes, m/s²; of a method that finds biases, without them.
     alpha : ndarray, shape (n, 3)
-        Angular acceleration, body axes, rad/s².
+        Angular acceleration, body axes, rad/s²; likewise.
     omega, omega_std : ndarray, shape (n, 3)
         Angular rate and its standard deviation, body axes, rad/s: by noise as measured, biases, and errors of gains,
         axes and mounting as a calibration or the data sheets state them; enlarged where the channels disagree by more.
@@ -62,6 +69,11 @@ class Estimate(PlottedResult):
         deviation, rad²/s²; NaN where the array doesn't see one.
     velocity, position : ndarray, shape (n, 3), optional
         Velocity, m/s, and position, m, of the body origin in the world, where asked for.
+    p_std, alpha_std, attitude_std, velocity_std, position_std : ndarray, shape (n, 3), optional
+        Standard deviations, as of ω, of methods that follow the path; of the attitude about the axes of the world, rad:
+        two of tilt and the heading, which counts from the start.
+    angle_std : ndarray, shape (n,), optional
+        Standard deviation of the angle, rad.
     health : mapping of str to ndarray, optional
         For each channel by name its health at each sample, shape (n,): 0 used, 1 excluded, 2 missing, 3 saturated,
         4 stuck, 5 in doubt (`gfimu.rate.health.fault.HealthCode`). None where the channels were not watched and all are
@@ -92,6 +104,12 @@ class Estimate(PlottedResult):
     omega_products_std: NDArray[np.float64]
     velocity: NDArray[np.float64] | None = None
     position: NDArray[np.float64] | None = None
+    p_std: NDArray[np.float64] | None = None
+    alpha_std: NDArray[np.float64] | None = None
+    attitude_std: NDArray[np.float64] | None = None
+    angle_std: NDArray[np.float64] | None = None
+    velocity_std: NDArray[np.float64] | None = None
+    position_std: NDArray[np.float64] | None = None
     health: Mapping[str, NDArray[Any]] | None = None
     sign_probability: NDArray[np.float64] | None = None
     metadata: Mapping[str, Any] = field(default_factory=dict)
@@ -123,16 +141,18 @@ class Estimate(PlottedResult):
     def _panels(self) -> list[Panel]:
         panels = [
             Panel("angular rate", "ω, rad/s", axis_series(self.omega, self.omega_std), self.t_s),
-            Panel("angular acceleration", "α, rad/s²", axis_series(self.alpha), self.t_s),
-            Panel("specific force of the origin", "p, m/s²", axis_series(self.p), self.t_s),
-            Panel("angle about the table's axis", "angle, rad", (Series("", self.angle),), self.t_s),
+            Panel("angular acceleration", "α, rad/s²", axis_series(self.alpha, self.alpha_std), self.t_s),
+            Panel("specific force of the origin", "p, m/s²", axis_series(self.p, self.p_std), self.t_s),
+            Panel(
+                "angle about the table's axis", "angle, rad", (Series("", self.angle, std=self.angle_std),), self.t_s
+            ),
         ]
-        for title, label, values in (
-            ("velocity in the world", "velocity, m/s", self.velocity),
-            ("position in the world", "position, m", self.position),
+        for title, label, values, std in (
+            ("velocity in the world", "velocity, m/s", self.velocity, self.velocity_std),
+            ("position in the world", "position, m", self.position, self.position_std),
         ):
             if values is not None:
-                panels.append(Panel(title, label, axis_series(values), self.t_s))
+                panels.append(Panel(title, label, axis_series(values, std), self.t_s))
         return panels
 
     def to_columns(self) -> dict[str, NDArray[Any]]:
@@ -144,7 +164,8 @@ class Estimate(PlottedResult):
                 columns |= {name: values[:, index] for index, name in enumerate(names)}
         health = {f"{_HEALTH}{name}": values for name, values in (self.health or {}).items()}
         sign = {} if self.sign_probability is None else {_SIGN: self.sign_probability}
-        return columns | sign | {"angle_rad": self.angle} | health
+        angle = {_ANGLE: self.angle} | ({} if self.angle_std is None else {_ANGLE_STD: self.angle_std})
+        return columns | sign | angle | health
 
     @property
     def sign_undecided(self) -> NDArray[np.bool_]:
@@ -172,13 +193,12 @@ class Estimate(PlottedResult):
             raise InputError(
                 f"{table.file}: Estimate format {version}; this gfimu reads {FORMAT_VERSION}: estimate again"
             )
-        optional = {
-            attribute for attribute in ("velocity", "position") if _VECTOR_COLUMNS[attribute][0] not in table.names
-        }
-        vectors = {attribute: names for attribute, names in _VECTOR_COLUMNS.items() if attribute not in optional}
+        absent = {attribute for attribute in _OPTIONAL if _VECTOR_COLUMNS[attribute][0] not in table.names}
+        vectors = {attribute: names for attribute, names in _VECTOR_COLUMNS.items() if attribute not in absent}
         sign = [name for name in (_SIGN,) if name in table.names]
+        turned = [name for name in (_ANGLE, _ANGLE_STD) if name in table.names or name == _ANGLE]
         watched = [name for name in table.names if name.startswith(_HEALTH)]
-        wanted = ["t_s", "angle_rad", *(name for names in vectors.values() for name in names), *sign, *watched]
+        wanted = ["t_s", *turned, *(name for names in vectors.values() for name in names), *sign, *watched]
         missing = [name for name in wanted if name not in table.names]
         if missing:
             raise InputError(f"{table.file}: column {missing[0]} is missing; give a file that gfimu estimate wrote")
@@ -188,7 +208,8 @@ class Estimate(PlottedResult):
         values = dict(zip(wanted, np.concatenate(blocks).T, strict=True))
         return cls(
             t_s=values["t_s"],
-            angle=values["angle_rad"],
+            angle=values[_ANGLE],
+            angle_std=values.get(_ANGLE_STD),
             health={name.removeprefix(_HEALTH): values[name].astype(np.int8) for name in watched} or None,
             sign_probability=values[_SIGN] if sign else None,
             metadata=table.metadata,

@@ -8,7 +8,8 @@ integration: the six products of its components.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,9 +26,10 @@ from gfimu.motion.channel_health import UsedReadings, watched_readings
 from gfimu.motion.earth import EarthRotation
 from gfimu.motion.estimate import FORMAT_VERSION, Estimate
 from gfimu.motion.navigation import level, navigate
-from gfimu.motion.rest_navigation import navigate_with_rest
-from gfimu.rate.problem import RateProblem
+from gfimu.rate.path_start import PathStart
+from gfimu.rate.problem import RateProblem, RateSolution
 from gfimu.rate.registry import rate_method
+from gfimu.rate.result import BodyPath
 from gfimu.rate.sensing import SensorErrors, calibrated_bias_std, step_of_readings
 from gfimu.rate.solve import solve_rate
 from gfimu.recording import Recording
@@ -50,6 +52,7 @@ def estimate(
     omega0: ArrayLike | None = None,
     quaternion0: ArrayLike | None = None,
     noise_std: ArrayLike | None = None,
+    levelled: bool = False,
     with_position: bool = False,
     earth: EarthRotation | None = None,
     gravity: float = STANDARD_GRAVITY,
@@ -79,6 +82,8 @@ def estimate(
         that levels the mean of p over the first second, with heading zero; good if the origin is not accelerated then.
     noise_std : array_like, scalar or shape (c,), optional
         Standard deviation of one sample of each channel, m/s²; by default from the parts' data sheets.
+    levelled : bool
+        Whether the biases of the first rest, on a level table, were taken off the readings.
     with_position : bool
         Whether to integrate p to velocity and position as well, from rest at the origin.
     earth : EarthRotation, optional
@@ -145,11 +150,12 @@ def estimate(
     gyro = _gyro(recording) if fuse_gyro else None
     temperature = recording.reference.get("temperature_degC")
     errors = SensorErrors.of_recording(
-        array, recording.metadata, recording.sample_rate, step=step_of_readings(readings), noise_std=noise
-    )
+        array, recording.metadata, recording.sample_rate, step=step_of_readings(readings), noise_std=noise,
+    )  # fmt: skip
+    path_start = _path_start(recording, quaternion0, gravity, earth, level=levelled)
     problem = RateProblem(
         array, recording.t_s, readings, errors, calibrated_bias_std(recording.metadata, array) is not None,
-        linear, rate0, gyro, temperature, progress,
+        linear, rate0, gyro, temperature, path_start, levelled, progress,
     )  # fmt: skip
     dead = [name for finding in found if finding.kind == "dead" for name in finding.channels]
     at_rest = chosen.open_loop if rate0 is None else not rate0.any()
@@ -164,35 +170,23 @@ def estimate(
         names = ", ".join(dead)
         raise InputError(f"without the dead {names}: {error}; --method filter may do without it") from None
     scale = np.ones(len(readings)) if rate.noise_scale is None else rate.noise_scale
-    motion = linear.with_omega(rate.omega)
-    alpha, p = motion[:, :3], motion[:, 3:]
-    start = _initial_attitude(recording, motion, rate.omega, quaternion0)
-    quaternion = integrate_attitude(recording.t_s, rate.omega, alpha, start)
-    turning = rate.omega
-    if earth is not None:
-        quaternion = earth.attitude_in_world(recording.t_s, quaternion)
-        turning = rate.omega - earth.in_body(quaternion)
-    mounting = Rotation.from_rotvec(recording.mounting_rotvec)
-    axis = mounting.inv().apply([0.0, 0.0, 1.0])  # the table's axis in body axes
-    travelled = None
-    if rate.rest is not None and rate.rest.any():  # gravity shows the tilt there, and the velocity is zero
-        levelled = navigate_with_rest(recording.t_s, p, quaternion, rate.rest, gravity=gravity, earth=earth)
-        quaternion = levelled.quaternion
-        travelled = levelled if with_position else None
-    elif with_position:
-        travelled = navigate(recording.t_s, p, quaternion, gravity=gravity, earth=earth)
+    if rate.path is None or chosen.open_loop:
+        motion = linear.with_omega(rate.omega)
+        start = _initial_attitude(recording, motion, rate.omega, quaternion0)
+        path = _integrated(recording, motion, rate, start, gravity, earth)
+        if rate.path is not None:
+            path |= {name: value for name, value in _followed(rate.path, rate.omega).items() if name.endswith("_std")}
+    else:
+        path = _followed(rate.path, rate.omega)
+    if not with_position:
+        path |= dict.fromkeys(("velocity", "velocity_std", "position", "position_std"))
     return Estimate(
         t_s=recording.t_s,
-        p=p,
-        alpha=alpha,
         omega=rate.omega,
         omega_std=rate.omega_std,
-        quaternion=quaternion,
-        angle=table_angle(recording.t_s, turning, axis=axis),
         omega_products=linear.omega_products,
         omega_products_std=linear.omega_products_std * scale[:, None],
-        velocity=None if travelled is None else travelled.velocity,
-        position=None if travelled is None else travelled.position,
+        **path,
         health=used.codes(array),
         sign_probability=rate.sign_probability,
         metadata={
@@ -211,6 +205,57 @@ def estimate(
             "software_version": __version__,
         },
     )
+
+
+def _path_start(
+    recording: Recording, attitude: ArrayLike | None, gravity: float, earth: EarthRotation | None, *, level: bool
+) -> PathStart:
+    """Return where the path starts: at the attitude given or mounted, exactly on a ``level`` table, else levelled."""
+    start = PathStart(axis=_table_axis(recording), gravity=gravity)
+    if earth is not None:
+        start = replace(start, earth=earth.rate)
+    if attitude is not None:
+        return replace(start, attitude=np.asarray(attitude, dtype=float))
+    if "mounting_rotvec_rad" not in recording.metadata:
+        return start
+    mounted = from_rotation(Rotation.from_rotvec(recording.mounting_rotvec))
+    return replace(start, attitude=mounted, attitude_std=0.0 if level else start.policy.mounting_std)
+
+
+def _table_axis(recording: Recording) -> NDArray[np.float64]:
+    """Return the table's axis in body axes, shape (3,)."""
+    return np.asarray(Rotation.from_rotvec(recording.mounting_rotvec).inv().apply([0.0, 0.0, 1.0]))
+
+
+def _followed(path: BodyPath, omega: NDArray[np.float64]) -> dict[str, Any]:
+    """Return the columns of an estimate by a method that follows the path, where it has a rate."""
+    known = path.known_at(np.asarray(np.isfinite(omega).all(axis=1)))
+    return {one.name: getattr(known, one.name) for one in fields(known)}
+
+
+def _integrated(
+    recording: Recording,
+    motion: NDArray[np.float64],
+    rate: RateSolution,
+    start: NDArray[np.float64],
+    gravity: float,
+    earth: EarthRotation | None,
+) -> dict[str, Any]:
+    """Return the columns of an estimate by integration of [α; p] (n, 6) and of the rate, without uncertainty."""
+    t, alpha, p = recording.t_s, motion[:, :3], motion[:, 3:]
+    quaternion, turning = integrate_attitude(t, rate.omega, alpha, start), rate.omega
+    if earth is not None:
+        quaternion = earth.attitude_in_world(t, quaternion)
+        turning = rate.omega - earth.in_body(quaternion)
+    travelled = navigate(t, p, quaternion, gravity=gravity, earth=earth)
+    return {
+        "alpha": alpha,
+        "p": p,
+        "quaternion": quaternion,
+        "angle": table_angle(t, turning, axis=_table_axis(recording)),
+        "velocity": travelled.velocity,
+        "position": travelled.position,
+    }
 
 
 def _gyro(recording: Recording) -> NDArray[np.float64]:

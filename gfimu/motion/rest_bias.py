@@ -2,7 +2,7 @@
 
 While nothing moves, each channel should read its share of gravity; what it reads beyond that is taken as its bias.
 Levelling is assumed: a tilt of the table goes into the biases. What is left afterwards is the noise of the average,
-and it grows into the rate with time; `RestBias.rate_std` says how much.
+and it grows into the rate with time.
 
 `force_at_rest` is the paper's Table 1 itself: what p of the whole array reads beyond gravity.
 """
@@ -27,7 +27,6 @@ from gfimu.base.short_repr import short_repr
 from gfimu.base.units import MILLI_G, STANDARD_GRAVITY
 from gfimu.motion.estimate import Estimate
 from gfimu.motion.estimation import estimate
-from gfimu.rate.registry import rate_method
 from gfimu.recording import Recording
 from gfimu.recording.checks import Finding, check_recording, refuse_or_warn, without_dead_channels
 from gfimu.recording.rest import Rest, detect_rest, mean_variance_factor
@@ -63,15 +62,6 @@ class RestBias:
         """Return the recording without these biases, in the channel order of the array."""
         readings = recording.for_array(self.array) - self.bias
         return replace(recording, readings=readings, channels=self.array.channels)
-
-    def rate_std(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the standard deviation that what is left of the biases gives an integrated rate, rad/s, (n, 3).
-
-        ``t`` has shape (n,), s; the integration starts at its first value.
-        """
-        pseudo_inverse = np.linalg.pinv(self.array.regression_matrix)  # (6, c)
-        alpha_std = np.sqrt(pseudo_inverse[:3] ** 2 @ self.std**2)  # (3,)
-        return (t - t[0])[:, None] * alpha_std
 
     def findings(self) -> tuple[Finding, ...]:
         """Return the channel whose bias exceeds its data sheet's limit most, as a reason to refuse; empty if none does.
@@ -281,7 +271,7 @@ def estimate_from_rest(
     array : AccelerometerArray
         Geometry of the channels.
     method : str
-        Method for the angular rate. The standard deviation of ``integrate`` grows by the uncertainty of the biases.
+        Method for the angular rate.
     gravity : float
         Local gravity, m/s².
     force : bool
@@ -307,12 +297,8 @@ def estimate_from_rest(
     found = rest_bias(recording, array, gravity=gravity, without=dead)
     findings += refuse_or_warn(found.findings(), force=force)
     result = estimate(
-        found.remove(recording), array, method=method, findings=findings, force=force, gravity=gravity, **options
-    )
-    left = found.rate_std(result.t_s) if rate_method(method).open_loop else 0.0
+        found.remove(recording), array, method=method, findings=findings, force=force, gravity=gravity,
+        levelled=True, **options,
+    )  # fmt: skip
     biases = dict(zip(array.channels, found.bias.tolist(), strict=True))
-    return replace(
-        result,
-        omega_std=np.hypot(result.omega_std, left),
-        metadata={**result.metadata, "rest_bias_m_s2": biases},
-    )
+    return replace(result, metadata={**result.metadata, "rest_bias_m_s2": biases})

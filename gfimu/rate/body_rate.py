@@ -1,7 +1,8 @@
 """The state model of a body's rate over the kernel, compiled: one sample after the other.
 
-State x = [ω (3); ε (3); b_α (3); b_z (m); b_gyro (0 or 3); φ (q)]: behind ω and ε stand constants, of which the errors
-φ of a calibration are considered and not estimated. From sample k − 1 to k, Δt later,
+State x = [ω (3); ε (3); path (0 or 10); b_α (3); b_z (m); b_p (0 or 3); b_gyro (0 or 3); φ (q)]: the path is that of
+`gfimu.rate.path`, behind it stand constants, of which the errors φ of the channels may be considered and not estimated.
+From sample k − 1 to k, Δt later,
 
     ω ← ω + ∫α + ½ Δt (ε_{k−1} + ε_k) − Δt b_α − ½ Δt (L s(ω))_{k−1, k} − Δt (K b_z) − ∫A D φ − γ Δt S r      (1)
 
@@ -34,11 +35,23 @@ from numba import njit
 from numpy.typing import NDArray
 
 from gfimu.base.compiled import INNER, compiled
-from gfimu.rate.kernel import cholesky, measure, predict, solve_lower, step_back
+from gfimu.rate.kernel import cholesky, predict, solve_lower, step_back, take
+from gfimu.rate.path import ROWS, TILT, Path, PathTuning, advance_path, motion_of, rest_on_path, settle_path, turned
 from gfimu.rate.probable_rate import probable_rate, shown_rate, slope_of
 from gfimu.rate.rest_test import MOVES, RESTS
 
-__all__ = ["BIASES", "STILL", "Carried", "Estimates", "Given", "Samples", "Tuning", "follow", "smooth_back"]
+__all__ = [
+    "STILL",
+    "Carried",
+    "Estimates",
+    "Given",
+    "Places",
+    "Samples",
+    "SingleRates",
+    "Tuning",
+    "follow",
+    "smooth_back",
+]
 
 _BROAD = 0.02  # tr P over |ω|² from which the null space is linearised at the most probable rate
 _UNKNOWN = 1.0  # the same, from which all of the rate's variance makes second-order terms
@@ -59,14 +72,31 @@ _UNUSABLE = 9.0  # χ² per degree of freedom of its best rate from which a samp
 _LARGEST_MISFIT = 100.0  # χ² of a sample, beyond which it says no more against a sign
 _STABLE = 0.1  # radians per step of the correction in (1) at which it is halved
 
-BIASES = 6
-"""Place of the first bias in the state."""
-
 # Places in Carried.scalars
 TIME, LAST_ALPHA, WALK, FOURTH, FIFTH, PARITY, LEVEL, EXCESS, LAGGED, MISFIT, LIKELIHOOD = range(11)
 WANDER, POWER, SCALARS = range(11, 14)
 # Places in Carried.counts
 STARTED, STILL, JUDGED, LAST_SET, ROUGH, SUMMED, COMPLETE, RESTING, SOLVED, COUNTS = range(10)
+
+
+class Places(NamedTuple):
+    """Places in the state."""
+
+    alpha: int  # of b_α, the first constant
+    products: int  # of b_z
+    force: int  # of b_p
+    gyro: int  # of the biases of a gyro
+    errors: int  # of the first error of a channel
+    end: int
+
+    @classmethod
+    def of(cls, products: int, errors: int, *, path: bool, gyro: bool) -> Places:
+        """Return the places for so many rows of the null space and errors of the channels."""
+        alpha = TILT + (ROWS if path else 0)
+        force = alpha + 3 + products
+        gyro_at = force + (3 if path else 0)
+        errors_at = gyro_at + (3 if gyro else 0)
+        return cls(alpha, alpha + 3, force, gyro_at, errors_at, errors_at + errors)
 
 
 class Tuning(NamedTuple):
@@ -92,9 +122,11 @@ class Tuning(NamedTuple):
     guard_window: int  # samples of a window of the guard; 0: no guard
     guard_limit: float  # sum of misfits less their mean from which the guard looks closer
     guard_clear: float  # χ² by which a rate of one sample must fit better
-    errors_at: int  # place of the first error of a channel in the state
+    at: Places
     solved_in_motion: int  # components of the state that are estimated before the first rest
+    open_loop: bool  # whether α is integrated without measurements of the rate
     compares: bool  # whether the likelihood of two mirrored rates is to be compared
+    path: PathTuning
 
 
 class Carried(NamedTuple):
@@ -110,6 +142,8 @@ class Carried(NamedTuple):
     prior: NDArray[np.float64]  # (n, n) covariance before the run, for a restart
     guard_white: NDArray[np.float64]  # (m, m) lower triangle, whitens z of set 0 with the biases' prior
     guard_sensitivity: NDArray[np.float64]  # (m, 6) of that
+    attitude: NDArray[np.float64]  # (4,) w, x, y, z, where the path is followed
+    recent: NDArray[np.float64]  # (4,) acceleration of the origin before the last sample, world axes, and last step
 
     @classmethod
     def at_start(
@@ -134,7 +168,7 @@ class Carried(NamedTuple):
         white = np.linalg.inv(np.linalg.cholesky(spread + np.eye(m)))
         return cls(
             x, covariance, scalars, counts, np.zeros(m), np.zeros(m), np.zeros(3 + m), prior, white,
-            white @ sensitivity,
+            white @ sensitivity, np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(4),
         )  # fmt: skip
 
     def copy(self) -> Carried:
@@ -159,6 +193,7 @@ class Samples(NamedTuple):
     z: NDArray[np.float64]  # (N, m)
     increment: NDArray[np.float64]  # (N, 3) ∫α over the interval before
     alpha: NDArray[np.float64]  # (N, 3)
+    force: NDArray[np.float64]  # (N, 3) P y
     differences: NDArray[np.float64]  # (N, 2) squares of the fourth and fifth difference of α
     channel_set: NDArray[np.int64]  # (N,) −1: α is not seen
     parity: NDArray[np.float64]  # (N,) χ² of the parity rows per degree of freedom; NaN where there are none
@@ -167,8 +202,22 @@ class Samples(NamedTuple):
     model_error: NDArray[np.float64]  # (N,) variance by errors of the sampling times over that of the noise
     features: NDArray[np.float64]  # (N, 12) of the motion, by this sample; (N, 0) where no errors are considered
     alpha_errors: NDArray[np.float64]  # (N, 3, q) A D
+    force_errors: NDArray[np.float64]  # (N, 3, q) P D
     error_increment: NDArray[np.float64]  # (N, 3, q) ∫A D over the interval before
     product_errors: NDArray[np.float64]  # (N, m, q) Z D
+
+
+class SingleRates(NamedTuple):
+    """Rates of single samples, by a method of its own, that a path is to follow; empty (N = 0) where there are none."""
+
+    omega: NDArray[np.float64]  # (N, 3) NaN where there is none
+    gain: NDArray[np.float64]  # (N, 3, m) derivative by the null space
+    covariance: NDArray[np.float64]  # (N, 3, 3) by the noise of the sample
+
+
+def no_rates() -> SingleRates:
+    """Return no rates of single samples."""
+    return SingleRates(np.empty((0, 3)), np.empty((0, 3, 0)), np.empty((0, 3, 3)))
 
 
 class Given(NamedTuple):
@@ -178,11 +227,14 @@ class Given(NamedTuple):
     level: NDArray[np.float64]  # (N,) variance of the noise over the stated one
     rest: NDArray[np.bool_]  # (N,) a block of rest ends here
     restart: NDArray[np.bool_]  # (N,) it starts anew behind this sample
+    attitude: NDArray[np.float64]  # (N, 4) where the path is followed
+    single: SingleRates
 
     @classmethod
-    def nothing(cls) -> Given:
-        """Return what a first estimate is given."""
-        return cls(np.empty((0, 3)), np.empty(0), np.empty(0, dtype=np.bool_), np.empty(0, dtype=np.bool_))
+    def nothing(cls, single: SingleRates | None = None) -> Given:
+        """Return what a first estimate is given: rates of single samples, or nothing."""
+        flags = np.empty(0, dtype=np.bool_)
+        return cls(np.empty((0, 3)), np.empty(0), flags, flags, np.empty((0, 4)), single or no_rates())
 
 
 class Estimates(NamedTuple):
@@ -196,17 +248,14 @@ class Estimates(NamedTuple):
     inflation: NDArray[np.float64]  # (N,) variance of the noise over the stated one
     rest: NDArray[np.bool_]  # (N,) a block of rest ended here
     restart: NDArray[np.bool_]  # (N,) the guard started anew behind this sample
-
-    def rows(self, part: slice) -> Estimates:
-        """Return some of the samples, as views."""
-        return Estimates._make(column[part] for column in self)
+    path: Path
 
     @classmethod
-    def empty(cls, n: int) -> Estimates:
+    def empty(cls, n: int, *, path: bool = False) -> Estimates:
         """Return room for n samples."""
         return cls(
             np.empty((n, 3)), np.empty((n, 6)), np.zeros(n), np.zeros(n, dtype=np.int64), np.zeros(n), np.ones(n),
-            np.zeros(n, dtype=np.bool_), np.zeros(n, dtype=np.bool_),
+            np.zeros(n, dtype=np.bool_), np.zeros(n, dtype=np.bool_), Path.empty(n if path else 0),
         )  # fmt: skip
 
 
@@ -219,13 +268,13 @@ def follow(samples, given, first, last, tables, tuning, carried, out, offset, re
     again = len(given.level) > 0
     x, p = carried.x, carried.covariance
     n, m = len(x), samples.z.shape[1]
-    gyro_axes = tuning.errors_at - 9 - m
+    r, gyro_at = tuning.at.alpha, tuning.at.gyro
     counts, scalars = carried.counts, carried.scalars
-    keep = len(record.used) > 0
-    transition = np.zeros((6, n))
-    added = np.zeros(6)
-    noise = np.zeros((6, 6))
-    work = np.zeros((6, n + 1))
+    keep, follows_path = len(record.used) > 0, tuning.at.alpha > TILT
+    transition = np.zeros((r, n))
+    added = np.zeros(r)
+    noise = np.zeros((r, r))
+    work = np.zeros((r, n + 1))
     slopes = np.zeros((max(m, 1), n))
     unit = np.zeros(n)
     gain = np.zeros(n)
@@ -238,43 +287,51 @@ def follow(samples, given, first, last, tables, tuning, carried, out, offset, re
             inflation = given.level[k]
         if counts[STARTED] > 0:
             _step(samples, given, k, tables, tuning, carried, inflation, transition, added, noise, place_of)
+            if len(given.single.omega) > 0 and not np.isnan(given.single.omega[k, 0]):
+                _take_over(samples, given.single, k, tables, tuning, x, transition, added, noise)
+            if follows_path:
+                step = samples.t[k] - scalars[TIME]
+                advance_path(samples, given, k, tables, tuning, carried, step, inflation, transition, added, noise)
             predict(x, p, transition, added, noise, work)
         else:
-            for a in range(6):
+            for a in range(r):
                 for j in range(n):
                     transition[a, j] = 1.0 if a == j else 0.0
+        if follows_path:
+            for i in range(4):
+                out.path.ahead[row, i] = carried.attitude[i]
         if keep:
             record.used[row] = 0
             for j in range(n):
                 record.predicted[row, j] = x[j]
-                for a in range(6):
+                for a in range(r):
                     record.transition[row, a, j] = transition[a, j]
                     record.rows[row, a, j] = p[a, j]
         nis, dof, stated = 0.0, 0, 0.0
-        if place >= 0 and tables.rows[place] > 0:
+        if place >= 0 and tables.rows[place] > 0 and not tuning.open_loop:
             dof = tables.rows[place]
             if not again and p[0, 0] + p[1, 1] + p[2, 2] > _BROAD * (x[0] * x[0] + x[1] * x[1] + x[2] * x[2]):
                 _bound(samples.z[k], tables, tuning, carried, place, inflation, unit, gain, record, row)
             nis, stated, inflation = _take_products(
                 samples, given, k, tables, tuning, carried, inflation, slopes, gain, record, row, place_of
             )
-        for a in range(gyro_axes):
+        for a in range(tuning.at.errors - gyro_at):
             if not np.isnan(samples.gyro[k, a]):
-                innovation = samples.gyro[k, a] - x[a] - x[9 + m + a]
-                unit[a] = unit[9 + m + a] = 1.0
-                square = innovation**2 * _take(
+                innovation = samples.gyro[k, a] - x[a] - x[gyro_at + a]
+                unit[a] = unit[gyro_at + a] = 1.0
+                square = innovation**2 * take(
                     x, p, unit, innovation, tuning.gyro_variance, counts[SOLVED], gain, record, row
                 )
                 nis += square
                 stated += square
-                unit[a] = unit[9 + m + a] = 0.0
+                unit[a] = unit[gyro_at + a] = 0.0
                 dof += 1
         if place >= 0:
             counts[SUMMED] += 1
             for a in range(3):
                 carried.sums[a] += samples.alpha[k, a]
                 for i in range(m):
-                    carried.sums[a] -= tables.alpha_bias[place, a, i] * x[9 + i]
+                    carried.sums[a] -= tables.alpha_bias[place, a, i] * x[tuning.at.products + i]
         if place == 0:
             counts[COMPLETE] += 1
             for i in range(m):
@@ -284,8 +341,11 @@ def follow(samples, given, first, last, tables, tuning, carried, out, offset, re
             counts[SOLVED] = n
             for a in range(3):
                 unit[a] = 1.0
-                _take(x, p, unit, -x[a], tuning.rest_variance, counts[SOLVED], gain, record, row)
+                take(x, p, unit, -x[a], tuning.rest_variance, counts[SOLVED], gain, record, row)
                 unit[a] = 0.0
+            if follows_path:
+                begin = max(k - tuning.path.rest_window + 1, 0)
+                rest_on_path(samples, begin, k, tables, tuning, carried, n, inflation, gain, record, row)
         counts[STARTED] = 1
         counts[LAST_SET] = place
         scalars[TIME] = samples.t[k]
@@ -296,10 +356,12 @@ def follow(samples, given, first, last, tables, tuning, carried, out, offset, re
         out.rest[row] = rests > 0
         doubted = place == 0 and not again and _guard(samples, k, tables, tuning, carried, inflation)
         out.restart[row] = rests == 2 or doubted
+        if follows_path and not again:
+            settle_path(carried)
         if rests == 2:
-            _start_again(carried, n, np.zeros(3), tuning.rest_variance)
+            _start_again(carried, tuning, n, np.zeros(3), tuning.rest_variance)
         elif again and given.restart[k]:
-            _start_again(carried, n, given.omega[k], _wide(given.omega[k], tables))
+            _start_again(carried, tuning, n, given.omega[k], _wide(given.omega[k], tables))
             out.restart[row] = True
         for a in range(3):
             out.omega[row, a] = x[a]
@@ -311,21 +373,15 @@ def follow(samples, given, first, last, tables, tuning, carried, out, offset, re
         out.dof[row] = dof
         out.stated[row] = stated
         out.inflation[row] = inflation
-
-
-@njit(**INNER)
-def _take(x, p, slope, innovation, variance, solved, gain, record, row):  # type: ignore[no-untyped-def]
-    """Take a scalar measurement and remember it; returns the inverse of the innovation's variance."""
-    inverse = measure(x, p, slope, innovation, variance, solved, gain)
-    if len(record.used) > 0:
-        used = record.used[row]
-        for j in range(len(x)):
-            record.slope[row, used, j] = slope[j]
-            record.gain[row, used, j] = gain[j]
-        record.inverse[row, used] = inverse
-        record.innovation[row, used] = innovation
-        record.used[row] = used + 1
-    return inverse
+        if follows_path:
+            for i in range(4):
+                out.path.attitude[row, i] = carried.attitude[i]
+            for i in range(ROWS - 3):
+                out.path.line[row, i] = x[TILT + 3 + i]
+            for i in range(ROWS):
+                out.path.variance[row, i] = p[TILT + i, TILT + i]
+            path = out.path
+            motion_of(samples, k, tables, tuning, x, p, inflation, path.motion[row], path.motion_variance[row])
 
 
 @njit(**INNER)
@@ -370,13 +426,13 @@ def _step(samples, given, k, tables, tuning, carried, level, transition, added, 
         transition[a, a] = 1.0
         transition[a, 3 + a] = carried_on
         transition[3 + a, 3 + a] = -tuning.overshoot
-        transition[a, 6 + a] = -step
+        transition[a, tuning.at.alpha + a] = -step
         added[a] = samples.increment[k, a]
-        ahead[a] = x[a] + added[a] + carried_on * x[3 + a] - step * x[6 + a]
+        ahead[a] = x[a] + added[a] + carried_on * x[3 + a] - step * x[tuning.at.alpha + a]
         for b in range(3):
             noise[3 + a, 3 + b] = renewed * tables.alpha_noise[near, a, b]
-        for j in range(tuning.errors_at, n):
-            transition[a, j] = -samples.error_increment[k, a, j - tuning.errors_at]
+        for j in range(tuning.at.errors, n):
+            transition[a, j] = -samples.error_increment[k, a, j - tuning.at.errors]
     for end in range(2):  # what a smaller set, or an array that sees products in α, leaves in it: predicted first
         here = before if end == 0 else place
         if here >= 0 and not tables.plain[here]:
@@ -385,7 +441,7 @@ def _step(samples, given, k, tables, tuning, carried, level, transition, added, 
                 for b in range(3):
                     ahead[a] -= 0.5 * half * along[b] * x[b]
                 for i in range(m):
-                    ahead[a] -= half * tables.alpha_bias[here, a, i] * x[9 + i]
+                    ahead[a] -= half * tables.alpha_bias[here, a, i] * x[tuning.at.products + i]
     for end in range(2):
         here = before if end == 0 else place
         if here < 0 or tables.plain[here]:
@@ -398,14 +454,34 @@ def _step(samples, given, k, tables, tuning, carried, level, transition, added, 
                 added[a] += half * along[b] * (0.5 * about[b] - change)
                 transition[a, b] -= half * along[b]
             for i in range(m):
-                transition[a, 9 + i] -= half * tables.alpha_bias[here, a, i]
-    if place == before and place >= 0 and tables.mixed[place]:
+                transition[a, tuning.at.products + i] -= half * tables.alpha_bias[here, a, i]
+    if place == before and place >= 0 and tables.mixed[place] and not tuning.open_loop:
         _correct_alpha(samples, given, k, tables, tuning, carried, level, renewed, transition, added, noise, place_of)
     for a in range(3):
         for b in range(3):
             noise[a, b] = half * half * noise[3 + a, 3 + b]
             noise[3 + a, b] = noise[a, 3 + b] = half * noise[3 + a, 3 + b]
     _add_uncertain_alpha(samples, k, tables, tuning, carried, step, noise)
+
+
+@njit(**INNER)
+def _take_over(samples, single, k, tables, tuning, x, transition, added, noise):  # type: ignore[no-untyped-def]
+    """Fill in the transition to the rate of a single sample, whose error is that of the null space, times its gain."""
+    m, at, place = samples.z.shape[1], tuning.at, samples.channel_set[k]
+    for a in range(3):
+        added[a] = single.omega[k, a]
+        for j in range(len(x)):
+            transition[a, j] = 0.0
+        for i in range(m):
+            for j in range(m):
+                transition[a, at.products + j] -= single.gain[k, a, i] * tables.product_bias[place, i, j]
+            for j in range(at.errors, at.end):
+                transition[a, j] -= single.gain[k, a, i] * samples.product_errors[k, i, j - at.errors]
+        for j in range(at.products, at.end):
+            added[a] -= transition[a, j] * x[j]
+        for b in range(3):
+            noise[a, b] = single.covariance[k, a, b]
+            noise[a, 3 + b] = noise[3 + b, a] = 0.0
 
 
 @njit(**INNER)
@@ -430,10 +506,10 @@ def _correct_alpha(samples, given, k, tables, tuning, carried, level, renewed, t
     for a in range(3):
         for i in range(m):
             added[a] -= weight * tables.cross_noise[place, a, i] * (carried.last_z[i] + samples.z[k, i])
-            transition[a, 9 + i] += 2.0 * weight * tables.cross_bias[place, a, i]
-            for j in range(tuning.errors_at, len(x)):
-                error = samples.product_errors[k - 1, i, j - tuning.errors_at]
-                error += samples.product_errors[k, i, j - tuning.errors_at]
+            transition[a, tuning.at.products + i] += 2.0 * weight * tables.cross_bias[place, a, i]
+            for j in range(tuning.at.errors, len(x)):
+                error = samples.product_errors[k - 1, i, j - tuning.at.errors]
+                error += samples.product_errors[k, i, j - tuning.at.errors]
                 transition[a, j] += weight * tables.cross_noise[place, a, i] * error
         for end in range(2):
             about = _about(given, k, end, x, ahead)
@@ -484,7 +560,7 @@ def _add_uncertain_alpha(samples, k, tables, tuning, carried, step, noise):  # t
 def _bound(z, tables, tuning, carried, place, level, unit, gain, record, row):  # type: ignore[no-untyped-def]
     """Bring the variance of each axis down to the largest square that the products of a sample allow, (3)."""
     x, p = carried.x, carried.covariance
-    m = len(z)
+    m, first = len(z), tuning.at.products
     for a in range(3):
         if not tables.square_seen[place, a]:
             continue
@@ -492,15 +568,15 @@ def _bound(z, tables, tuning, carried, place, level, unit, gain, record, row):  
         variance = 0.0
         for j in range(m):
             weight = tables.inverse_bias[place, a, j]
-            shown += tables.inverse[place, a, j] * z[j] - weight * x[9 + j]
+            shown += tables.inverse[place, a, j] * z[j] - weight * x[first + j]
             variance += level * tables.inverse[place, a, j] ** 2
             if weight != 0.0:
                 for i in range(m):
-                    variance += weight * p[9 + i, 9 + j] * tables.inverse_bias[place, a, i]
+                    variance += weight * p[first + i, first + j] * tables.inverse_bias[place, a, i]
         largest = max(shown, 0.0) + _DEVIATIONS * np.sqrt(variance)
         if p[a, a] > largest:
             unit[a] = 1.0
-            _take(x, p, unit, -x[a], largest * p[a, a] / (p[a, a] - largest), carried.counts[SOLVED], gain, record, row)
+            take(x, p, unit, -x[a], largest * p[a, a] / (p[a, a] - largest), carried.counts[SOLVED], gain, record, row)
             unit[a] = 0.0
 
 
@@ -518,13 +594,13 @@ def _take_products(samples, given, k, tables, tuning, carried, level, slopes, ga
     first_level = level
     for i in range(count):
         for j in range(m):
-            slopes[i, 9 + j] = tables.product_bias[place, i, j]
-        for j in range(tuning.errors_at, n):
-            slopes[i, j] = samples.product_errors[k, i, j - tuning.errors_at]
+            slopes[i, tuning.at.products + j] = tables.product_bias[place, i, j]
+        for j in range(tuning.at.errors, n):
+            slopes[i, j] = samples.product_errors[k, i, j - tuning.at.errors]
     again = len(given.level) > 0
     if again:
         lin[:] = given.omega[k]
-    curved = not again and _linearise(samples.z[k], tables, place, carried, level, slopes, lin, factor)
+    curved = not again and _linearise(samples.z[k], tables, place, tuning, carried, level, slopes, lin, factor)
     for i in range(count):
         slope_of(tables.sensitivity[place, i], lin, slope)
         constant[i] = samples.z[k, i]  # innovation at x = 0 of the linearised row
@@ -563,7 +639,7 @@ def _take_products(samples, given, k, tables, tuning, carried, level, slopes, ga
         innovation = constant[i]
         for j in range(n):
             innovation -= slopes[i, j] * x[j]
-        inverse = _take(x, p, slopes[i], innovation, variance, carried.counts[SOLVED], gain, record, row)
+        inverse = take(x, p, slopes[i], innovation, variance, carried.counts[SOLVED], gain, record, row)
         nis += innovation * innovation * inverse
         if tuning.compares:
             share = variance * inverse
@@ -601,13 +677,13 @@ def _steady_share(samples, k, tables, tuning, carried, level):  # type: ignore[n
 
 
 @njit(**INNER)
-def _linearise(z, tables, place, carried, level, slopes, lin, factor):  # type: ignore[no-untyped-def]
+def _linearise(z, tables, place, tuning, carried, level, slopes, lin, factor):  # type: ignore[no-untyped-def]
     """Choose the rate about which the null space is linearised; ``slopes`` (m, n) hold those of the constants.
 
     Returns whether second-order terms matter; then ``factor`` is the Cholesky factor of the noise with them.
     """
     x, p = carried.x, carried.covariance
-    n, count = len(x), tables.rows[place]
+    n, count, first = len(x), tables.rows[place], tuning.at.products
     size = x[0] * x[0] + x[1] * x[1] + x[2] * x[2]
     spread = p[0, 0] + p[1, 1] + p[2, 2]
     for a in range(3):
@@ -622,17 +698,17 @@ def _linearise(z, tables, place, carried, level, slopes, lin, factor):  # type: 
     for i in range(count):
         target[i] = z[i]
         spread_of[:] = 0.0
-        for j in range(9, n):
+        for j in range(first, n):
             weight = slopes[i, j]
             if weight == 0.0:
                 continue
             target[i] -= weight * x[j]
             for a in range(3):
                 crossed[i, a] += weight * p[j, a]
-            for r in range(9, n):
+            for r in range(first, n):
                 spread_of[r] += weight * p[j, r]
         for q in range(i + 1):
-            for r in range(9, n):
+            for r in range(first, n):
                 inner[i, q] += spread_of[r] * slopes[q, r]
         inner[i, i] += level
     prior = np.empty((3, 3))
@@ -659,7 +735,7 @@ def _linearise(z, tables, place, carried, level, slopes, lin, factor):  # type: 
                 inner[i, q] -= crossed[i, a] * crossed[q, a]
     seeds = np.empty((3, 3))
     shown = np.empty(3)
-    shown_rate(tables.inverse[place], z, carried.x, tables.product_bias[place], shown)
+    shown_rate(tables.inverse[place], z, carried.x, first, tables.product_bias[place], shown)
     for a in range(3):
         seeds[0, a] = x[a]
         seeds[1, a] = shown[a]
@@ -773,7 +849,7 @@ def _rests(samples, k, tables, tuning, carried):  # type: ignore[no-untyped-def]
         for a in range(3):
             turning[i] -= 0.5 * along[a] * carried.x[a]
         for j in range(m):
-            spread[i, j] = carried.prior[9 + i, 9 + j]
+            spread[i, j] = carried.prior[tuning.at.products + i, tuning.at.products + j]
         spread[i, i] += 1.0 / counts[COMPLETE]
     cholesky(spread, m)
     solve_lower(spread, resting, m)
@@ -788,19 +864,19 @@ def _rests(samples, k, tables, tuning, carried):  # type: ignore[no-untyped-def]
 def _lasting_alpha(samples, k, tuning, carried, value, factor):  # type: ignore[no-untyped-def]
     """Fill in what biases and errors of the channels make of A y at sample k, (3,), and its covariance (3, 3)."""
     x, p = carried.x, carried.covariance
-    n, first = len(x), tuning.errors_at
+    n, first = len(x), tuning.at.errors
     row = np.zeros(n)
     for a in range(3):
-        value[a] = x[BIASES + a]
+        value[a] = x[tuning.at.alpha + a]
         for j in range(n):
-            row[j] = p[BIASES + a, j]
+            row[j] = p[tuning.at.alpha + a, j]
         for i in range(first, n):
             weight = samples.alpha_errors[k, a, i - first]
             value[a] += weight * x[i]
             for j in range(n):
                 row[j] += weight * p[i, j]
         for b in range(3):
-            factor[a, b] = row[BIASES + b]
+            factor[a, b] = row[tuning.at.alpha + b]
             for j in range(first, n):
                 factor[a, b] += row[j] * samples.alpha_errors[k, b, j - first]
 
@@ -814,15 +890,25 @@ def _square(factor, value):  # type: ignore[no-untyped-def]
 
 
 @njit(**INNER)
-def _start_again(carried, solved, omega, variance):  # type: ignore[no-untyped-def]
-    """Start anew from a rate (3,) with this variance per axis, and the biases as they were before the run."""
-    x = carried.x
+def _start_again(carried, tuning, solved, omega, variance):  # type: ignore[no-untyped-def]
+    """Start anew from a rate (3,) with this variance per axis, and the biases as they were before the run.
+
+    The path goes on, with an attitude as uncertain as the change of the rate makes it over a window of the guard.
+    """
+    x, end = carried.x, tuning.at.alpha  # of the path
     for i in range(len(x)):
-        x[i] = 0.0
         for j in range(len(x)):
-            carried.covariance[i, j] = carried.prior[i, j]
+            if not (TILT <= i < end and TILT <= j < end):
+                carried.covariance[i, j] = carried.prior[i, j]
     for a in range(3):
-        x[a] = omega[a]
+        lost = tuning.guard_window * tuning.period * (omega[a] - x[a])
+        if end > TILT:
+            for b in range(3):
+                carried.covariance[TILT + b, TILT + b] += lost * lost
+        x[a], x[3 + a] = omega[a], 0.0
+    for i in range(end, len(x)):
+        x[i] = 0.0
+    for a in range(3):
         carried.covariance[a, a] = variance
     carried.counts[SOLVED] = solved
     carried.scalars[EXCESS] = 1.0
@@ -863,7 +949,7 @@ def _guard(samples, k, tables, tuning, carried, level):  # type: ignore[no-untyp
     side = _side(samples, k, own, tuning, carried)
     for a in range(3):
         own[a] *= side
-    _start_again(carried, tuning.solved_in_motion, own, _wide(own, tables))
+    _start_again(carried, tuning, tuning.solved_in_motion, own, _wide(own, tables))
     return True
 
 
@@ -883,7 +969,7 @@ def _own_rate(z, tables, carried, own):  # type: ignore[no-untyped-def]
         for j in range(i + 1):
             target[i] += carried.guard_white[i, j] * z[j]
     seeds = np.zeros((2, 3))
-    shown_rate(tables.inverse[0], z, np.zeros(9 + m), tables.product_bias[0], own)
+    shown_rate(tables.inverse[0], z, np.zeros(m), 0, tables.product_bias[0], own)
     for a in range(3):
         seeds[0, a] = carried.x[a]
         seeds[1, a] = own[a]
@@ -910,7 +996,7 @@ def _side(samples, k, omega, tuning, carried):  # type: ignore[no-untyped-def]
             if samples.channel_set[j - 1] != 0 or samples.t[j] - samples.t[j - 1] > _GAP * tuning.period:
                 break
             for a in range(3):
-                back[a] -= samples.increment[j, a] - (samples.t[j] - samples.t[j - 1]) * x[BIASES + a]
+                back[a] -= samples.increment[j, a] - (samples.t[j] - samples.t[j - 1]) * x[tuning.at.alpha + a]
             misfits[which] += min(_misfit(samples.z[j - 1], carried, back), _LARGEST_MISFIT)
     along = omega[0] * x[0] + omega[1] * x[1] + omega[2] * x[2]
     if abs(misfits[0] - misfits[1]) < tuning.guard_clear:
@@ -934,22 +1020,31 @@ def _misfit(z, carried, omega):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def smooth_back(record, restart, first, last, adjoint, curvature, omega, covariance):  # type: ignore[no-untyped-def]
+def smooth_back(samples, record, restart, first, last, tables, tuning, end, adjoint, curvature, out, again):  # type: ignore[no-untyped-def]
     """Smooth the samples of a record, whose sample 0 is ``first``, back from sample ``last − 1``.
 
     ``restart`` (N,) marks samples behind which the filter started anew: nothing goes on across them. ``adjoint`` (n,)
-    and ``curvature`` (n, n) are carried from block to block. Fills ``omega`` (N, 3) and ``covariance`` (N, 6).
+    and ``curvature`` (n, n) are carried from block to block. ``end`` is the state behind the last sample, and ``again``
+    the estimates of the filter over these samples. Fills rates, their covariance and the path in ``out``.
     """
-    rate = np.empty(6)
-    spread = np.empty((6, 6))
+    r, x, path = tuning.at.alpha, end.x.copy(), out.path
+    value, spread = np.empty(r), np.empty((r, r))
     for k in range(last - 1, first - 1, -1):
         if restart[k]:
             adjoint[:] = 0.0
             curvature[:] = 0.0
-        step_back(record, k - first, adjoint, curvature, rate, spread)
+        step_back(record, k - first, adjoint, curvature, value, spread)
         for a in range(3):
-            omega[k, a] = rate[a]
-            covariance[k, a] = spread[a, a]
-        covariance[k, 3] = spread[0, 1]
-        covariance[k, 4] = spread[0, 2]
-        covariance[k, 5] = spread[1, 2]
+            out.omega[k, a] = x[a] = value[a]
+            out.covariance[k, a] = spread[a, a]
+        out.covariance[k, 3] = spread[0, 1]
+        out.covariance[k, 4] = spread[0, 2]
+        out.covariance[k, 5] = spread[1, 2]
+        if r > TILT:
+            turned(again.path.ahead[k - first], value[TILT : TILT + 3], True, path.attitude[k])
+            for i in range(ROWS - 3):
+                path.line[k, i] = value[TILT + 3 + i]
+            for i in range(ROWS):
+                path.variance[k, i] = spread[TILT + i, TILT + i]
+            level = out.inflation[k]
+            motion_of(samples, k, tables, tuning, x, end.covariance, level, path.motion[k], path.motion_variance[k])

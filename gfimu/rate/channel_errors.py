@@ -91,12 +91,22 @@ class ChannelErrors:
         return cls(np.array(patterns).reshape(-1, c, 12))
 
     def excited(
-        self, sets: ChannelSets, moments: NDArray[np.float64], period: float, policy: ErrorPolicy = ErrorPolicy()
+        self,
+        sets: ChannelSets,
+        moments: NDArray[np.float64],
+        period: float,
+        *,
+        path: bool = False,
+        policy: ErrorPolicy = ErrorPolicy(),
     ) -> Self:
-        """Return the combinations that matter in a motion whose features have these moments (12, 12)."""
+        """Return the combinations that matter in a motion whose features have these moments (12, 12).
+
+        Those that matter to p count where the ``path`` is followed.
+        """
         full = sets.full
-        weights = np.concatenate([1.0 / np.diag(full.alpha_noise), np.ones(sets.products)])
-        seen = np.vstack([full.alpha_rows, full.product_rows]) @ self.patterns  # (q, 3 + m, 12)
+        noise = np.concatenate([np.diag(full.alpha_noise), np.ones(sets.products), np.diag(full.force_noise)])
+        seen = sets.rows(path=path) @ self.patterns  # (q, 3 + m, 12), or with p (q, 6 + m, 12)
+        weights = 1.0 / noise[: seen.shape[1]]
         values, vectors = np.linalg.eigh(np.einsum("qkf,fg,k,rkg->qr", seen, moments, weights, seen, optimize=True))
         matter = values * policy.memory_s / period > policy.least
         kept = vectors[:, matter][:, ::-1][:, : policy.most]

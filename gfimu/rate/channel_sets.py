@@ -4,12 +4,12 @@ The c readings y of a rigid body that moves with α, p and ω are y = J [α; p] 
 products of ω. For any set of channels they fall into three parts:
 
 * α = A y − L s(ω) − A b, with A J = [1 0]: what a filter integrates. A is the unweighted left inverse, cleaned of the
-  products as far as the null space sees them well; L is what remains.
+  products as far as the null space sees them well; L is what remains. p = P y − L_p s(ω) − P b is solved alike.
 * z = Z y = M s(ω) + Z b + noise, with Z J = 0: the combinations that see products, at most six; whitened.
 * parity rows, which see neither: they show the noise, and the biases that only smaller sets of channels see.
 
-The biases that a filter can know are b_α = A b and b_z = Z b of the full set. A smaller set sees these and the parity
-biases, A' b = b_α + K b_z + K' b_p and Z' b = T b_z + T' b_p.
+The biases that a filter can know are b_α = A b, b_z = Z b and b_p = P b of the full set. A smaller set sees these and
+the parity biases b_0, A' b = b_α + K b_z + K' b_0, P' b = b_p + K_p b_z + K_p' b_0 and Z' b = T b_z + T' b_0.
 """
 
 from __future__ import annotations
@@ -42,6 +42,8 @@ class ChannelSet(NamedTuple):
         L.
     alpha_noise : ndarray, shape (3, 3)
         Covariance of the noise of A y, (rad/s²)².
+    force_rows, force_leak, force_noise : ndarray, shapes (3, c), (3, 6), (3, 3)
+        P, L_p and the covariance of the noise of P y, (m/s²)².
     product_rows : ndarray, shape (m, c)
         Z; zero rows behind those that this set has.
     sensitivity : ndarray, shape (m, 6)
@@ -54,6 +56,8 @@ class ChannelSet(NamedTuple):
         K and T.
     alpha_parity, product_parity : ndarray, shapes (3, d), (m, d)
         K' and T'.
+    force_bias, force_parity : ndarray, shapes (3, m), (3, d)
+        K_p and K_p'.
     inverse : ndarray, shape (6, m)
         M⁺, which gives the products from z as far as they are seen.
     square_seen : ndarray of bool, shape (3,)
@@ -75,6 +79,9 @@ class ChannelSet(NamedTuple):
     alpha_rows: NDArray[np.float64]
     leak: NDArray[np.float64]
     alpha_noise: NDArray[np.float64]
+    force_rows: NDArray[np.float64]
+    force_leak: NDArray[np.float64]
+    force_noise: NDArray[np.float64]
     product_rows: NDArray[np.float64]
     sensitivity: NDArray[np.float64]
     rows: int
@@ -83,6 +90,8 @@ class ChannelSet(NamedTuple):
     product_bias: NDArray[np.float64]
     alpha_parity: NDArray[np.float64]
     product_parity: NDArray[np.float64]
+    force_bias: NDArray[np.float64]
+    force_parity: NDArray[np.float64]
     inverse: NDArray[np.float64]
     square_seen: NDArray[np.bool_]
     plain: bool
@@ -100,6 +109,9 @@ class SetTables(NamedTuple):
 
     leak: NDArray[np.float64]  # (sets, 3, 6)
     alpha_noise: NDArray[np.float64]  # (sets, 3, 3)
+    force_leak: NDArray[np.float64]  # (sets, 3, 6)
+    force_noise: NDArray[np.float64]  # (sets, 3, 3)
+    force_bias: NDArray[np.float64]  # (sets, 3, m)
     sensitivity: NDArray[np.float64]  # (sets, m, 6)
     rows: NDArray[np.int64]  # (sets,)
     cross_noise: NDArray[np.float64]  # (sets, 3, m)
@@ -190,17 +202,22 @@ class ChannelSets:
             self._tables = SetTables(*(np.stack([getattr(one, key) for one in self.sets]) for key in SetTables._fields))
         return self._tables
 
-    def bias_covariance(self, channels: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Covariance of [b_α; b_z], shape (3 + m, 3 + m), of channel biases with the covariance (c, c), m²/s⁴."""
-        rows = np.vstack([self.full.alpha_rows, self.full.product_rows])
+    def bias_covariance(self, channels: NDArray[np.float64], *, path: bool = False) -> NDArray[np.float64]:
+        """Covariance of [b_α; b_z], or [b_α; b_z; b_p], of channel biases with the covariance (c, c), m²/s⁴."""
+        rows = self.rows(path=path)
         return np.asarray(rows @ channels @ rows.T)
+
+    def rows(self, *, path: bool = False) -> NDArray[np.float64]:
+        """Rows [A; Z] of the full set, (3 + m, c), or with those of p, [A; Z; P]."""
+        rows = [self.full.alpha_rows, self.full.product_rows]
+        return np.vstack([*rows, self.full.force_rows] if path else rows)
 
     def _build(self, present: NDArray[np.bool_]) -> ChannelSet:
         c, m, d = self.array.n_channels, self._products, len(self.parity_rows)
         everything = bool(present.all())
-        rows, leak, noise = np.zeros((3, c)), np.zeros((3, 6)), np.zeros((3, 3))
+        rows, leak, noise = np.zeros((6, c)), np.zeros((6, 6)), np.zeros((6, 6))  # of [α; p]
         product_rows, sensitivity, mixing = np.zeros((m, c)), np.zeros((m, 6)), np.zeros((m, m + d))
-        biases = np.zeros((3, m + d))
+        biases = np.zeros((6, m + d))
         count = -1
         if np.linalg.matrix_rank(self.array.regression_matrix[present] / self._scale, tol=1e-6) == 6:
             # Combinations of the null space that don't touch the missing channels.
@@ -212,21 +229,21 @@ class ChannelSets:
             product_rows[:count] = ordered[:count]
             mixing[:count] = ordered[:count] * self._variance @ self._basis.T
             sensitivity[:count] = _clean(product_rows[:count] @ self.array.centripetal_matrix)
-            rows = self._alpha_rows(present, product_rows[:count])
-            full = rows if everything else self.full.alpha_rows
+            rows = self._motion_rows(present, product_rows[:count])
+            full = rows if everything else np.vstack([self.full.alpha_rows, self.full.force_rows])
             biases = (rows - full) * self._variance @ self._basis.T
             leak = _clean(rows @ self.array.centripetal_matrix)
             noise = rows * self._variance @ rows.T
         inverse = np.linalg.pinv(sensitivity, rcond=_SEEN)  # (6, m)
         seen = np.abs((inverse @ sensitivity)[:3] - np.eye(6)[:3]).max(axis=1) < _SEEN
-        cross = rows * self._variance @ product_rows.T
-        mixed = bool(np.any(np.square(cross) > _RANK * noise.max(initial=0.0)))
+        cross = rows[:3] * self._variance @ product_rows.T
+        mixed = bool(np.any(np.square(cross) > _RANK * noise[:3, :3].max(initial=0.0)))
         return ChannelSet(
-            rows, leak, noise, product_rows, sensitivity, count, cross, biases[:, :m], mixing[:, :m],
-            biases[:, m:], mixing[:, m:], np.asarray(inverse, dtype=np.float64), seen,
-            everything and not leak.any(), mixed, float(np.sum(sensitivity**2)),
-            cross @ sensitivity, cross @ mixing[:, :m], cross @ cross.T, float(np.sum((cross @ sensitivity) ** 2)),
-            np.asarray(inverse[:3] @ mixing[:, :m], dtype=np.float64),
+            rows[:3], leak[:3], noise[:3, :3], rows[3:], leak[3:], noise[3:, 3:], product_rows, sensitivity, count,
+            cross, biases[:3, :m], mixing[:, :m], biases[:3, m:], mixing[:, m:], biases[3:, :m], biases[3:, m:],
+            np.asarray(inverse, dtype=np.float64), seen, everything and not leak[:3].any(), mixed,
+            float(np.sum(sensitivity**2)), cross @ sensitivity, cross @ mixing[:, :m], cross @ cross.T,
+            float(np.sum((cross @ sensitivity) ** 2)), np.asarray(inverse[:3] @ mixing[:, :m], dtype=np.float64),
         )  # fmt: skip
 
     def _whitened(self, basis: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -235,11 +252,11 @@ class ChannelSets:
         factor = np.linalg.cholesky(basis * self._variance @ basis.T)
         return np.linalg.solve(factor, basis)
 
-    def _alpha_rows(self, present: NDArray[np.bool_], product_rows: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Rows A of the working channels: unweighted left inverse, cleaned of products that are seen well."""
-        rows = np.zeros((3, self.array.n_channels))
+    def _motion_rows(self, present: NDArray[np.bool_], product_rows: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Rows [A; P] (6, c) of the working channels: unweighted left inverse, cleaned of products seen well."""
+        rows = np.zeros((6, self.array.n_channels))
         inverse = np.linalg.pinv(self.array.regression_matrix[present] / self._scale)
-        rows[:, present] = inverse[:3] / self.array.length_unit
+        rows[:, present] = inverse / self._scale[:, None]
         leak = _clean(rows @ self.array.centripetal_matrix)
         if leak.any() and len(product_rows):
             seen = product_rows @ self.array.centripetal_matrix

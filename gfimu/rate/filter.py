@@ -12,6 +12,7 @@ from gfimu.array.array import AccelerometerArray
 from gfimu.base.errors import GeometryError, InputError
 from gfimu.rate.body_rate import LIKELIHOOD, Estimates
 from gfimu.rate.live import LiveRateFilter
+from gfimu.rate.path_start import PathStart
 from gfimu.rate.result import DECIDED, RateEstimate, SignDecision, clear_of_zero
 from gfimu.rate.sensing import SensorErrors
 from gfimu.rate.settings import FilterSettings
@@ -30,6 +31,7 @@ def filter_rate(
     settings: FilterSettings | None = None,
     *,
     gyro: ArrayLike | None = None,
+    path: PathStart | None = None,
     progress: Callable[[float], object] | None = None,
 ) -> RateEstimate:
     """Filter a recording: the estimate of the angular rate by the samples up to each.
@@ -50,6 +52,8 @@ def filter_rate(
         Start, quadrature, rest.
     gyro : array_like, shape (n, 3), optional
         Gyro to fuse, rad/s; NaN where saturated.
+    path : PathStart, optional
+        Where attitude, velocity and position start, if they are asked for.
     progress : callable, optional
         Called with the share of the work done so far, 0 to 1.
 
@@ -60,7 +64,7 @@ def filter_rate(
     GeometryError
         If the array can't see all six motions.
     """
-    return _solve("filter", array, t, readings, errors, settings, gyro, progress, smooth=False)
+    return _solve("filter", array, t, readings, errors, settings, gyro, path, progress, smooth=False)
 
 
 def smooth_rate(
@@ -71,13 +75,14 @@ def smooth_rate(
     settings: FilterSettings | None = None,
     *,
     gyro: ArrayLike | None = None,
+    path: PathStart | None = None,
     progress: Callable[[float], object] | None = None,
 ) -> RateEstimate:
     """Smooth a recording: the estimate of the angular rate by all samples; arguments are those of `filter_rate`.
 
     ``nis`` are those of the filter.
     """
-    return _solve("smoother", array, t, readings, errors, settings, gyro, progress, smooth=True)
+    return _solve("smoother", array, t, readings, errors, settings, gyro, path, progress, smooth=True)
 
 
 def increasing_times(t: ArrayLike, needed_by: str) -> tuple[NDArray[np.float64], float]:
@@ -104,12 +109,13 @@ def _solve(
     errors: SensorErrors,
     settings: FilterSettings | None,
     gyro: ArrayLike | None,
+    path: PathStart | None,
     progress: Callable[[float], object] | None,
     *,
     smooth: bool,
 ) -> RateEstimate:
     times, period = increasing_times(t, f"the {method}")
-    live = LiveRateFilter(array, errors, period, settings, gyro=gyro is not None, progress=progress)
+    live = LiveRateFilter(array, errors, period, settings, gyro=gyro is not None, path=path, progress=progress)
     tracks = live.run_recording(times, readings, gyro, smooth=smooth)
     assert live.start is not None
     found = [live.estimate_of(times, out, method, index) for index, out in enumerate(tracks)]
@@ -126,8 +132,8 @@ def _signed(live: LiveRateFilter, tracks: list[Estimates], found: list[RateEstim
     if live.has_gyro or not judge.possible or not (live.start.sign_open or live.restarts or disagrees):
         return replace(found[0], sign=SignDecision())
     chances = [
-        judge.of_recording(live.samples, carried, out, one.rest)
-        for carried, out, one in zip(live.carried, tracks, found, strict=True)
+        judge.of_recording(live.samples, live.constants(index), out, one.rest)
+        for index, (out, one) in enumerate(zip(tracks, found, strict=True))
     ]
     best, sure = likelier(*live.carried) if len(found) > 1 else (0, 0.5)
     if len(found) > 1 and merged(found[0], found[1]):
@@ -145,7 +151,7 @@ def _signed(live: LiveRateFilter, tracks: list[Estimates], found: list[RateEstim
         result = replace(result, sign=replace(result.sign, state="decided"))
     if result.sign.state == "undecided":
         return replace(result, mirrored=replace(found[1 - best], sign=result.sign))
-    so_far = judge.of_stream(live.samples, live.carried[best], tracks[best], found[best].rest)
+    so_far = judge.of_stream(live.samples, live.constants(best), tracks[best], found[best].rest)
     decided = np.flatnonzero((so_far > DECIDED) & clear_of_zero(result.omega, result.std))
     at = float(result.t_s[decided[0]]) if decided.size else float(result.t_s[-1])
     ratio = abs(float(live.carried[0].scalars[LIKELIHOOD] - live.carried[1].scalars[LIKELIHOOD]))

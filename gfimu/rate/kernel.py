@@ -1,6 +1,6 @@
 """One Kalman kernel for every state model: prediction, scalar measurement, likelihood and smoothing, compiled.
 
-A model fills the arrays and calls three functions. The state x (n,) has ``dynamic`` components in front, which change
+A model fills the arrays and calls these functions. The state x (n,) has ``dynamic`` components in front, which change
 from sample to sample; behind them stand constants, which do not: biases, gains, levers. Of these the last ones may be
 *considered* (S. F. Schmidt, Application of state-space methods to navigation problems, Advances in Control Systems 3,
 1966): their uncertainty enters every covariance and every gain, and they are not corrected themselves.
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from gfimu.base.compiled import INNER
 
-__all__ = ["Record", "cholesky", "measure", "predict", "solve_lower", "step_back"]
+__all__ = ["Record", "cholesky", "measure", "predict", "solve_lower", "step_back", "take"]
 
 
 class Record(NamedTuple):
@@ -121,6 +121,21 @@ def measure(x, p, slope, innovation, variance, solved, gain):  # type: ignore[no
             p[i, j] -= weight * gain[j]
     for i in range(n):
         gain[i] = gain[i] * root if i < solved else 0.0
+    return inverse
+
+
+@njit(**INNER)
+def take(x, p, slope, innovation, variance, solved, gain, record, row):  # type: ignore[no-untyped-def]
+    """Take a scalar measurement and remember it; returns the inverse of the innovation's variance."""
+    inverse = measure(x, p, slope, innovation, variance, solved, gain)
+    if len(record.used) > 0:
+        used = record.used[row]
+        for j in range(len(x)):
+            record.slope[row, used, j] = slope[j]
+            record.gain[row, used, j] = gain[j]
+        record.inverse[row, used] = inverse
+        record.innovation[row, used] = innovation
+        record.used[row] = used + 1
     return inverse
 
 

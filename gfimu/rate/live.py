@@ -10,7 +10,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,7 +17,6 @@ from numpy.typing import ArrayLike, NDArray
 from gfimu.array.array import AccelerometerArray
 from gfimu.base.errors import InputError
 from gfimu.rate.body_rate import (
-    BIASES,
     LAST_ALPHA,
     RESTING,
     SOLVED,
@@ -28,20 +26,27 @@ from gfimu.rate.body_rate import (
     Carried,
     Estimates,
     Given,
+    Places,
     Samples,
+    SingleRates,
     Tuning,
     follow,
+    no_rates,
     smooth_back,
 )
 from gfimu.rate.channel_errors import ChannelErrors, features_of, usual_moments
 from gfimu.rate.channel_sets import ChannelSets
+from gfimu.rate.constants import Constants
 from gfimu.rate.increments import integrals
 from gfimu.rate.kernel import Record
 from gfimu.rate.measured_noise import measured_noise, timing_noise
+from gfimu.rate.path import ROWS, TILT, rest_on_path
+from gfimu.rate.path_start import PathStart, levelled, settled, with_attitude
 from gfimu.rate.reduction import Reduction
 from gfimu.rate.rest_test import MOVES, RESTS, RestJudge, RestTest, still_blocks
 from gfimu.rate.result import (
     DECIDED,
+    BodyPath,
     ChannelReport,
     RateEstimate,
     SignDecision,
@@ -64,28 +69,6 @@ _STAYS = 0.02  # numerical: mean change of a rate in its standard deviations at 
 _SMOOTHER_BLOCK = 512  # numerical: samples whose record is kept at once
 
 
-class LeadingRest(NamedTuple):
-    """What the rest at the start of a recording shows."""
-
-    constants: NDArray[np.float64]  # (3 + m + q,) biases of α and z, errors of the channels
-    covariance: NDArray[np.float64]  # of them
-    rest: NDArray[np.bool_]  # (n,) samples of that rest
-
-    def of_alpha(self, samples: Samples) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return what the constants make of A y, (n, 3), and its slopes by them, (n, 3, 3 + m + q)."""
-        n, m = samples.z.shape
-        biases = np.broadcast_to(np.eye(3, 3 + m), (n, 3, 3 + m))
-        slopes = np.concatenate([biases, samples.alpha_errors], axis=2)
-        return slopes @ self.constants, slopes
-
-    def of_products(self, samples: Samples) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return what the constants make of z, (n, m), and its covariance, (n, m, m)."""
-        n, m = samples.z.shape
-        biases = np.broadcast_to(np.eye(3 + m)[3:], (n, m, 3 + m))
-        slopes = np.concatenate([biases, samples.product_errors], axis=2)
-        return slopes @ self.constants, slopes @ self.covariance @ np.swapaxes(slopes, 1, 2)
-
-
 class LiveRateFilter:
     """Rate filter for a stream of samples.
 
@@ -101,6 +84,10 @@ class LiveRateFilter:
         Start, quadrature, rest, noise.
     gyro : bool
         Whether gyro readings come along.
+    open_loop : bool
+        Whether α is integrated, with the biases of a first rest, and the rate is measured nowhere else.
+    path : PathStart, optional
+        Where the path starts, if attitude, velocity and position are to be followed as well.
     progress : callable, optional
         Called with the share of each block of samples that is filtered, 0 to 1.
 
@@ -124,6 +111,8 @@ class LiveRateFilter:
         settings: FilterSettings | None = None,
         *,
         gyro: bool = False,
+        open_loop: bool = False,
+        path: PathStart | None = None,
         progress: Callable[[float], object] | None = None,
     ) -> None:
         self.array, self.errors, self.period = array, errors, period
@@ -133,7 +122,7 @@ class LiveRateFilter:
         self._ahead = stencil.points - 2 + stencil.before[0]
         self._test = self.settings.rest or RestTest()
         self._window = self._test.window(period)
-        self.has_gyro, self._progress = gyro, progress
+        self.has_gyro, self._open_loop, self._path, self._progress = gyro, open_loop, path, progress
         self._waiting: list[tuple[NDArray[np.float64], ...]] = []
         self._last_time = -np.inf
         self._received = 0
@@ -251,31 +240,37 @@ class LiveRateFilter:
         complete = first[np.isfinite(first).all(axis=1)]
         noise = self.errors.noise_at_rest(sets.noise_std)
         still = bool(np.any(still_blocks(first, noise, self.period, self._test.of_start)))
-        prior = sets.bias_covariance(np.diag(self.errors.bias_std**2))
+        prior = sets.bias_covariance(np.diag(self.errors.bias_std**2), path=self._path is not None)
         self.start = start = self._inferred(complete, prior, still=still)
         prior = start.bias_factor * prior
-        errors_at = 9 + m + 3 * self.has_gyro
+        at = Places.of(m, q, path=self._path is not None, gyro=self.has_gyro)
         self.tuning: Tuning = tuning_of(
-            sets, self.errors, self.period, self.settings, errors_at=errors_at,
-            solved_in_motion=errors_at + q if self.has_gyro else 9, compares=start.sign_open,
+            sets, self.errors, self.period, self.settings, at=at, compares=start.sign_open and not self._open_loop,
+            open_loop=self._open_loop,
+            solved_in_motion=at.end if self.has_gyro else at.products,
+            path=(self._path or PathStart()).tuning(self._window),
         )  # fmt: skip
         self._judge = RestJudge(sets.full.alpha_noise / self._window, self._test)
         self._signs = SignJudge(sets, start, self.period)
-        before = self._covariance_before(prior, errors_at)
+        before = self._covariance_before(prior)
         carried = Carried.at_start(
-            t[0], start.omega, start.std, before, prior[3:, 3:] + self._errors_of_products, sets.full.sensitivity
+            t[0],
+            start.omega,
+            start.std,
+            before,
+            prior[3 : 3 + m, 3 : 3 + m] + self._errors_of_products,
+            sets.full.sensitivity,
         )
         if start.sign_open:
             carried.counts[SOLVED] = self.tuning.solved_in_motion
-        elif still and not start.omega.any() and len(complete) == len(first):
-            learnt = np.r_[BIASES : 9 + m, errors_at : errors_at + q]
-            carried.x[learnt], carried.covariance[np.ix_(learnt, learnt)] = self._learnt(prior, complete)
+        elif still and self.settings.rest is not None and not start.omega.any() and len(complete) == len(first):
+            self._learnt(prior, complete).put(carried, self.tuning.at)
             carried.last_z[:] = sets.full.product_rows @ complete[-1]
             carried.counts[[STARTED, RESTING]], carried.counts[STILL] = 1, self.tuning.rest_entry
             carried.scalars[[TIME, LAST_ALPHA]] = t[len(complete) - 1]
             self._resumed = len(complete)
         self.carried = [carried]
-        if start.sign_open and start.omega.any():
+        if start.sign_open and start.omega.any() and not self._open_loop:
             mirrored = carried.copy()
             mirrored.x[:3] = -start.omega
             self.carried.append(mirrored)
@@ -286,20 +281,21 @@ class LiveRateFilter:
             std = np.full(3, self.settings.start_std)
             return Start("given", self.settings.start_omega, std, np.diag(std**2))
         turned = self._errors_of_mean(complete)
-        spread = (prior + turned @ turned.T)[3:, 3:]
+        seen = slice(3, 3 + self.sets.products)
+        spread = prior[seen, seen] + turned[seen] @ turned[seen].T
         z = complete @ self.sets.full.product_rows.T
         return infer_start(self.sets, z, spread, still=still, rest_std=self._test.rate_std)
 
-    def _covariance_before(self, biases: NDArray[np.float64], errors_at: int) -> NDArray[np.float64]:
+    def _covariance_before(self, biases: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the covariance of the state before the run, but for the rate, (n, n)."""
-        size = errors_at + len(self._reduction.considered)
-        gyro = range(BIASES + len(biases), errors_at)
-        before = np.zeros((size, size))
+        at = self.tuning.at
+        gyro, errors = range(at.gyro, at.errors), range(at.errors, at.end)
+        before = np.zeros((at.end, at.end))
         settled = (1.0 + self.tuning.overshoot) / (1.0 - self.tuning.overshoot)
         before[3:6, 3:6] = settled * self.sets.full.alpha_noise
-        before[BIASES : gyro.start, BIASES : gyro.start] = biases
+        before[at.alpha : at.gyro, at.alpha : at.gyro] = biases
         before[gyro, gyro] = self.errors.gyro_bias_std**2
-        before[range(errors_at, size), range(errors_at, size)] = 1.0
+        before[errors, errors] = 1.0
         return before
 
     def _advance(self, *, closing: bool) -> tuple[Samples, list[Estimates]]:
@@ -318,7 +314,7 @@ class LiveRateFilter:
 
     def _resting(self, first: int, last: int) -> Estimates:
         """Return room for rows ``first`` to ``last − 1``, with the estimates of a first block that rests."""
-        out = Estimates.empty(last - first)
+        out = Estimates.empty(last - first, path=self._path is not None)
         if first < self._resumed:
             rows = slice(0, self._resumed - first)
             out.omega[rows], out.covariance[rows] = 0.0, 0.0
@@ -370,8 +366,8 @@ class LiveRateFilter:
 
     def _record(self, length: int) -> Record:
         m = self.sets.products
-        size = self.tuning.errors_at + len(self._reduction.considered)
-        return Record.empty(length, 6, size, m + 9 + 3 * self.has_gyro)
+        at = self.tuning.at
+        return Record.empty(length, at.alpha, at.end, m + 15 + 3 * self.has_gyro)
 
     def _judge_blocks(self, *, closing: bool) -> None:
         """Mark the blocks that are decided to be rest or not; filter again from the end of one that is decided anew."""
@@ -427,15 +423,63 @@ class LiveRateFilter:
         until = self._prepare(closing=True)
         outputs = []
         for index, carried in enumerate(self.carried):
+            if self._path is not None:
+                self._start_path(carried, self._path)
             start, out = carried.copy(), self._resting(0, until)
+            self._rest_path(carried, out, carried.attitude, np.diag(carried.covariance)[TILT:])
             report = partial(self._report_progress, index)
             kept = self._forward(carried, Given.nothing(), out, report)
             if smooth:
-                self._smooth(start, kept, out, report)
+                end = self._smooth(start, carried, kept, out, report)
+                if self._path is not None and until > self._resumed:
+                    path = out.path
+                    self._rest_path(end, out, path.attitude[self._resumed], path.variance[self._resumed])
             outputs.append(out)
         self._done = self._resumed = until
         self.restarts += int(outputs[0].restart.sum())
         return outputs
+
+    def _start_path(self, carried: Carried, path: PathStart) -> None:
+        """Put the attitude at the first sample into a state, and what a first block of rest shows."""
+        samples, policy, at = self._samples, path.policy, self.tuning.at
+        if path.attitude is None:
+            bias = carried.covariance[range(at.alpha, at.products), range(at.alpha, at.products)].max()
+            enough = np.sqrt(2.0 * policy.level_turn / np.sqrt(bias)) if bias > 0.0 else np.inf
+            first = samples.t <= samples.t[0] + min(policy.level_s, enough)
+            if self._resumed:
+                attitude, _ = levelled(samples.t[first], 0.0 * samples.alpha[first], samples.force[first], np.zeros(3))
+                std = policy.unknown_tilt
+            else:
+                attitude, std = levelled(samples.t[first], samples.alpha[first], samples.force[first], carried.x[:3])
+        else:
+            attitude, std = path.attitude / np.linalg.norm(path.attitude), path.attitude_std
+        carried.attitude[:] = attitude
+        carried.covariance[TILT, TILT] = carried.covariance[TILT + 1, TILT + 1] = std**2
+        if self._resumed:
+            tables, gain = self.sets.tables(), np.zeros(len(carried.x))
+            rest_on_path(
+                samples, 0, self._resumed - 1, tables, self.tuning, carried, len(carried.x), 1.0, gain,
+                self._record(0), 0,
+            )  # fmt: skip
+            with_attitude(carried, settled(carried))
+
+    def _rest_path(
+        self, known: Carried, out: Estimates, attitude: NDArray[np.float64], variance: NDArray[np.float64]
+    ) -> None:
+        """Fill in the path over a first block that rests, with the constants of a state."""
+        if self._path is None or not self._resumed:
+            return
+        rows = slice(0, self._resumed)
+        samples = Samples._make(column[rows] for column in self._samples)
+        path, constants = out.path, Constants.of_state(known, self.tuning.at)
+        path.attitude[rows], path.line[rows], path.variance[rows] = attitude, 0.0, variance[:ROWS]
+        for part, values, (lasting, slopes), noise in (
+            (slice(0, 3), samples.alpha, constants.of_alpha(samples), self.sets.full.alpha_noise),
+            (slice(3, 6), samples.force, constants.of_force(samples), self.sets.full.force_noise),
+        ):
+            path.motion[rows, part] = values - lasting
+            spread = constants.variance_by(slopes) + noise
+            path.motion_variance[rows, part] = np.diagonal(spread, axis1=1, axis2=2)
 
     def _forward(
         self, carried: Carried, given: Given, out: Estimates, report: Callable[[float], object]
@@ -451,63 +495,113 @@ class LiveRateFilter:
         return kept
 
     def _smooth(
-        self, start: Carried, kept: list[tuple[int, int, Carried]], out: Estimates, report: Callable[[float], object]
-    ) -> None:
-        """Replace rates of a filter by smoothed ones.
+        self,
+        start: Carried,
+        end: Carried,
+        kept: list[tuple[int, int, Carried]],
+        out: Estimates,
+        report: Callable[[float], object],
+    ) -> Carried:
+        """Replace estimates of a filter by smoothed ones; returns the last state.
 
         Where the errors of the null space were not estimated from the first sample on, everything is linearised about
         the last rates and estimated anew, until the rates stay: Gauss and Newton's method for the whole run (B. M.
         Bell, The iterated Kalman smoother as a Gauss-Newton method, SIAM J. Optim. 4, 1994).
         """
-        if start.counts[SOLVED] == len(start.x) and not out.restart.any():
-            self._backward(kept, Given.nothing(), out, report)
-            return
+        solved = start.counts[SOLVED] == len(start.x) and not out.restart.any()
+        if solved:
+            self._backward(end, kept, Given.nothing(), out, report)
+            if self._path is None or not out.rest[self._resumed :].any():
+                return end
         start.counts[SOLVED] = len(start.x)
         for _ in range(_PASSES):
-            before = out.omega.copy()
-            given = Given(before, out.inflation, out.rest, out.restart)
+            before, attitude = out.omega.copy(), out.path.attitude.copy()
+            given = Given(before, out.inflation, out.rest, out.restart, attitude, no_rates())
             again = self._resting(0, len(out.nis))
-            kept = self._forward(start.copy(), given, again, report)
-            self._backward(kept, given, out, report)
+            end = start.copy() if self._path is None else with_attitude(start.copy(), attitude[0])
+            kept = self._forward(end, given, again, report)
+            self._backward(end, kept, given, out, report)
             moved = np.abs(out.omega - before) / np.sqrt(out.covariance[:, :3])
             if np.nanmean(moved) < _STAYS:
                 break
+        return end
 
     def _backward(
-        self, kept: list[tuple[int, int, Carried]], given: Given, out: Estimates, report: Callable[[float], object]
+        self,
+        end: Carried,
+        kept: list[tuple[int, int, Carried]],
+        given: Given,
+        out: Estimates,
+        report: Callable[[float], object],
     ) -> None:
         """Smooth blocks of a recording from the last to the first; fills the rates and their covariance."""
         size, until = len(kept[0][2].x) if kept else 0, len(out.nis)
         adjoint, curvature = np.zeros(size), np.zeros((size, size))
-        tables, record, again = self.sets.tables(), self._record(_SMOOTHER_BLOCK), Estimates.empty(_SMOOTHER_BLOCK)
+        tables, record, again = (
+            self.sets.tables(),
+            self._record(_SMOOTHER_BLOCK),
+            Estimates.empty(_SMOOTHER_BLOCK, path=self._path is not None),
+        )
         for first, last, state in reversed(kept):
             follow(self._samples, given, first, last, tables, self.tuning, state, again, -first, record)
-            smooth_back(record, out.restart, first, last, adjoint, curvature, out.omega, out.covariance)
+            smooth_back(
+                self._samples,
+                record,
+                out.restart,
+                first,
+                last,
+                tables,
+                self.tuning,
+                end,
+                adjoint,
+                curvature,
+                out,
+                again,
+            )
             report(1.0 - 0.6 * first / until)
 
-    def leading_rest(self, t: ArrayLike, readings: ArrayLike) -> LeadingRest:
-        """Reduce a whole recording; returns what the rest at its start shows, or the stated errors without a rest."""
+    def follow_rates(self, single: SingleRates | None = None) -> Estimates:
+        """Integrate a recording whose leading rest is known: α, or the path of rates of single samples."""
+        carried, until = self.carried[0], len(self._samples.t)
+        if single is not None and not self._resumed:
+            known = np.flatnonzero(np.isfinite(single.omega).all(axis=1))
+            carried.x[:3] = single.omega[known[0]] if known.size else 0.0
+        if self._path is not None:
+            self._start_path(carried, self._path)
+        out = self._resting(0, until)
+        self._rest_path(carried, out, carried.attitude, np.diag(carried.covariance)[TILT:])
+        self._forward(carried, Given.nothing(single), out, lambda share: None)
+        return out
+
+    def leading_rest(self, t: ArrayLike, readings: ArrayLike) -> tuple[Constants, NDArray[np.bool_]]:
+        """Reduce a whole recording; returns the constants by the rest at its start, if any, and the samples of it."""
         self._take_recording(t, readings, None)
         self._prepare(closing=True)
-        window, m = self._window, self.sets.products
+        window, at = self._window, self.tuning.at
         rest = np.zeros(len(self._samples.t), dtype=np.bool_)
-        prior = self.carried[0].prior[BIASES : 9 + m, BIASES : 9 + m]
+        prior = self.carried[0].prior[at.alpha : at.gyro, at.alpha : at.gyro]
         if self._resumed:
             verdicts = self._samples.still[2 * window - 1 :: window]
             rest[: (1 + int(np.argmin(np.append(verdicts, MOVES) == RESTS))) * window] = True
+        self._samples.still[~rest] = 0  # no other one is used
         usable = np.where(np.abs(self._raw) < self.errors.limits, self._raw, np.nan)[rest]
-        return LeadingRest(*self._learnt(prior, usable[np.isfinite(usable).all(axis=1)]), rest)
+        return self._learnt(prior, usable[np.isfinite(usable).all(axis=1)]), rest
+
+    def constants(self, index: int = 0) -> Constants:
+        """Return biases and errors of the channels as a track knows them now."""
+        return Constants.of_state(self.carried[index], self.tuning.at)
 
     def channel_biases(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the biases (c,), m/s², that α, the null space and the parity rows show now, and their covariance.
 
         They are the least ones: what of a bias looks like a specific force stays unknown.
         """
-        full, m, parity = self.sets.full, self.sets.products, self.sets.parity_rows
-        back = np.linalg.pinv(np.vstack([full.alpha_rows, full.product_rows, parity]))
-        values = np.concatenate([self.carried[0].x[BIASES : 9 + m], self._reduction.parity_mean])
+        parity, known = self.sets.parity_rows, 3 + self.sets.products
+        back = np.linalg.pinv(np.vstack([self.sets.rows(), parity]))
+        constants = self.constants()
+        values = np.concatenate([constants.values[:known], self._reduction.parity_mean])
         spread = np.zeros((len(values), len(values)))
-        spread[: 3 + m, : 3 + m] = self.carried[0].covariance[BIASES : 9 + m, BIASES : 9 + m]
+        spread[:known, :known] = constants.covariance[:known, :known]
         return np.asarray(back @ values), np.asarray(back @ spread @ back.T)
 
     def _consider(self, readings: NDArray[np.float64], *, whole: bool) -> None:
@@ -523,42 +617,39 @@ class LiveRateFilter:
             moments = features.T @ features / max(len(features), 1)
             if not whole:
                 moments = moments + usual_moments()
-            considered = self._stated_errors.excited(self.sets, moments, self.period)
+            considered = self._stated_errors.excited(self.sets, moments, self.period, path=self._path is not None)
             self._errors_of_products = considered.covariance_of(self.sets.full.product_rows, moments)
         self._reduction = Reduction(self.sets, self.errors, self.period, considered, self._stated_errors)
         self._samples = self._reduction.none()
 
     def _errors_of_mean(self, readings: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return what each considered error makes of the mean of [A y; Z y] over complete readings, (3 + m, q)."""
-        considered, full = self._reduction.considered, self.sets.full
+        considered = self._reduction.considered
         if not (len(considered) and len(readings)):
             return np.zeros((3 + self.sets.products, len(considered)))
         features = features_of(self.array, readings, np.ones(self.array.n_channels, dtype=np.bool_)).mean(axis=0)
-        return considered.of_rows(np.vstack([full.alpha_rows, full.product_rows]), features[None])[0]
+        return considered.of_rows(self.sets.rows(), features[None])[0]
 
-    def _learnt(
-        self, prior: NDArray[np.float64], readings: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return [b_α; b_z; φ] (3 + m + q) and its covariance after complete readings (n, c) at rest.
+    def _learnt(self, prior: NDArray[np.float64], readings: NDArray[np.float64]) -> Constants:
+        """Return the constants after complete readings (n, c) at rest.
 
-        ``prior`` (3 + m, 3 + m) is that of the biases.
+        ``prior`` is the covariance of the biases, [b_α; b_z] and where the path is followed b_p.
         """
         count, q = len(prior), len(self._reduction.considered)
         covariance = np.zeros((count + q, count + q))
         covariance[:count, :count] = prior
         covariance[range(count, count + q), range(count, count + q)] = 1.0
         if not len(readings):
-            return np.zeros(count + q), covariance
-        slopes = np.hstack([np.eye(count), self._errors_of_mean(readings)])
+            return Constants(np.zeros(count + q), covariance)
+        slopes = np.hstack([np.eye(3 + self.sets.products, count), self._errors_of_mean(readings)])
         spread = slopes @ covariance @ slopes.T + self._noise_of_mean(len(readings))
         gain = np.linalg.solve(spread, slopes @ covariance).T
-        shown = np.vstack([self.sets.full.alpha_rows, self.sets.full.product_rows]) @ readings.mean(axis=0)
-        return gain @ shown, covariance - gain @ spread @ gain.T
+        shown = self.sets.rows() @ readings.mean(axis=0)
+        return Constants(gain @ shown, covariance - gain @ spread @ gain.T)
 
     def _noise_of_mean(self, count: int) -> NDArray[np.float64]:
         """Covariance of the mean of [A y; Z y] over so many samples at rest, shape (3 + m, 3 + m)."""
-        full = self.sets.full
-        rows = np.vstack([full.alpha_rows, full.product_rows])
+        rows = self.sets.rows()
         noise = rows * self.sets.noise_std**2 @ rows.T / count
         noise[range(3), range(3)] += 2.0 * (self._test.rate_std / (count * self.period)) ** 2
         return np.asarray(noise)
@@ -578,7 +669,7 @@ class LiveRateFilter:
         doubt = self.start.sign_open or self.restarts > 0 or self._disagreeing >= DISAGREES_OFTEN
         if self.has_gyro or not (self._signs.possible and doubt):
             return replace(found, sign_probability=np.full(len(found), 0.5 if self.start.sign_open else 1.0))
-        chance = self._signs.of_stream(samples, self.carried[0], out, found.rest)
+        chance = self._signs.of_stream(samples, self.constants(), out, found.rest)
         if len(tracks) > 1:
             best, sure = likelier(*self.carried)
             other = self.estimate_of(samples.t, tracks[1], index=1)
@@ -600,14 +691,24 @@ class LiveRateFilter:
         """Return a result of a track's output."""
         sign = SignDecision("undecided", 0.0) if len(self.carried) > 1 or self.restarts else SignDecision()
         carried = self.carried[index] if self.carried else None
-        biases = slice(BIASES, self.tuning.errors_at) if self.carried else slice(0)
+        biases = slice(self.tuning.at.alpha, self.tuning.at.errors) if self.carried else slice(0)
         return RateEstimate(
             method, t, out.omega, full_covariance(out.covariance), out.nis, out.dof,
             spread_rest(out.rest, self._window), sign,
             bias=None if carried is None else carried.x[biases].copy(),
             bias_covariance=None if carried is None else carried.covariance[biases, biases].copy(),
             channels=self.report, scale=self.noise_ratio * np.sqrt(out.inflation), stated_nis=out.stated,
-            start=self.start,
+            start=self.start, path=None if self._path is None or not len(t) else self._body_path(out),
+        )  # fmt: skip
+
+    def _body_path(self, out: Estimates) -> BodyPath:
+        """Return the path of a recording; no α and p where too few channels are there."""
+        path, std = out.path, np.sqrt(np.maximum(out.path.variance, 0.0))
+        seen = (self._samples.channel_set >= 0)[:, None]
+        motion, spread = (np.where(seen, one, np.nan) for one in (path.motion, np.sqrt(path.motion_variance)))
+        return BodyPath(
+            path.attitude, std[:, :3], path.line[:, :3], std[:, 3:6], path.line[:, 3:6], std[:, 6:9], path.line[:, 6],
+            std[:, 9], motion[:, :3], spread[:, :3], motion[:, 3:], spread[:, 3:],
         )  # fmt: skip
 
 

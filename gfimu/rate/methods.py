@@ -15,6 +15,7 @@ method         uses                                        sign of ω           
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 
@@ -23,6 +24,9 @@ from gfimu.rate.registry import RATE_METHODS, rate_method
 from gfimu.rate.result import RateEstimate
 from gfimu.rate.sensing import SensorErrors
 from gfimu.rate.settings import FilterSettings
+
+if TYPE_CHECKING:
+    from gfimu.rate.path_start import PathStart
 
 __all__ = ["RATE_METHODS", "estimate_rate"]
 
@@ -36,6 +40,7 @@ def estimate_rate(
     method: str = "filter",
     settings: FilterSettings | None = None,
     gyro: ArrayLike | None = None,
+    path: PathStart | None = None,
     progress: Callable[[float], object] | None = None,
 ) -> RateEstimate:
     """Estimate the angular rate of a recording.
@@ -57,6 +62,8 @@ def estimate_rate(
         biases from a leading rest if the start is at rest.
     gyro : array_like, shape (n, 3), optional
         Gyro that ``filter`` and ``smoother`` fuse, rad/s; NaN where saturated.
+    path : PathStart, optional
+        Where attitude, velocity and position start, for a method that follows them (`RateMethod.follows_path`).
     progress : callable, optional
         Called by ``filter`` and ``smoother`` with the share of the work done so far, 0 to 1.
 
@@ -77,8 +84,9 @@ def estimate_rate(
     """
     chosen = rate_method(method)
     start = settings or FilterSettings()
+    followed = {"path": path} if chosen.follows_path else {}
     if chosen.recursive:
-        return chosen.solver(array, t, readings, errors, start, gyro=gyro, progress=progress)
+        return chosen.solver(array, t, readings, errors, start, gyro=gyro, progress=progress, **followed)
     if gyro is not None:
         chosen.refuse_gyro()
-    return chosen.solver(array, t, readings, errors, start)
+    return chosen.solver(array, t, readings, errors, start, **followed)

@@ -18,14 +18,16 @@ from gfimu.array.array import AccelerometerArray
 from gfimu.base.compiled import compiled
 from gfimu.base.errors import GeometryError
 from gfimu.rate.algebraic import rate_from_products
+from gfimu.rate.body_rate import SingleRates
 from gfimu.rate.channel_sets import ChannelSet
 from gfimu.rate.disagreement import measured_scale
 from gfimu.rate.filter import increasing_times
 from gfimu.rate.live import LiveRateFilter
 from gfimu.rate.maximum_likelihood import rates_of_null_space
 from gfimu.rate.measured_noise import noise_ratio
-from gfimu.rate.residual import least_curvature, residual_of
-from gfimu.rate.result import RateEstimate
+from gfimu.rate.path_start import PathStart
+from gfimu.rate.residual import bounded_covariance, least_curvature, residual_of
+from gfimu.rate.result import RateEstimate, clear_of_zero
 from gfimu.rate.sensing import SensorErrors
 from gfimu.rate.settings import FilterSettings
 from gfimu.rate.sign_chain import sign_probabilities
@@ -42,6 +44,8 @@ def maximum_likelihood_rate(
     readings: ArrayLike,
     errors: SensorErrors,
     settings: FilterSettings | None = None,
+    *,
+    path: PathStart | None = None,
 ) -> RateEstimate:
     """Estimate the rate of each sample by maximum likelihood, at the Cramér–Rao bound.
 
@@ -57,6 +61,8 @@ def maximum_likelihood_rate(
         Noise and biases of the channels, and their range.
     settings : FilterSettings, optional
         Start and rest.
+    path : PathStart, optional
+        Where attitude, velocity and position start, if they are asked for.
 
     Returns
     -------
@@ -68,7 +74,7 @@ def maximum_likelihood_rate(
     GeometryError
         If the array sees fewer than three products.
     """
-    return _estimate("ml", _most_probable, array, t, readings, errors, settings, least_rank=3)
+    return _estimate("ml", _most_probable, array, t, readings, errors, settings, path, least_rank=3)
 
 
 def algebraic_rate(
@@ -77,6 +83,8 @@ def algebraic_rate(
     readings: ArrayLike,
     errors: SensorErrors,
     settings: FilterSettings | None = None,
+    *,
+    path: PathStart | None = None,
 ) -> RateEstimate:
     """Estimate the rate of each sample by the tensor method, in closed form; as `maximum_likelihood_rate`.
 
@@ -85,7 +93,7 @@ def algebraic_rate(
     GeometryError
         If the array sees fewer than six products.
     """
-    return _estimate("algebraic", _closed_form, array, t, readings, errors, settings, least_rank=6)
+    return _estimate("algebraic", _closed_form, array, t, readings, errors, settings, path, least_rank=6)
 
 
 def _estimate(
@@ -96,6 +104,7 @@ def _estimate(
     readings: ArrayLike,
     errors: SensorErrors,
     settings: FilterSettings | None,
+    path: PathStart | None,
     *,
     least_rank: int,
 ) -> RateEstimate:
@@ -104,20 +113,21 @@ def _estimate(
     rows = np.asarray(readings, dtype=float)
     ratio = noise_ratio(array, rows, errors, period) if rows.shape == (len(times), array.n_channels) else 1.0
     chosen = replace(settings or FilterSettings(), measure_noise=False)
-    live = LiveRateFilter(array, replace(errors, noise_std=ratio * errors.noise_std), period, chosen)
+    louder = replace(errors, noise_std=ratio * errors.noise_std)
+    live = LiveRateFilter(array, louder, period, chosen, open_loop=True, path=path)
     sensitivity = live.sets.full.sensitivity
     if live.sets.products < least_rank or np.linalg.matrix_rank(sensitivity, tol=1e-9) < least_rank:
         raise GeometryError(
             f"array {array.name!r} sees {live.sets.products} products of the rate; method {method!r} needs "
             f"{least_rank}; use filter"
         )
-    leading = live.leading_rest(times, readings)
-    rest = leading.rest
+    leading, rest = live.leading_rest(times, readings)
     sets, samples = live.sets, live.samples
     sensitivity = sets.full.sensitivity
     complete = (samples.channel_set == 0)[:, None]
     of_alpha, slopes = leading.of_alpha(samples)
-    of_z, spread = leading.of_products(samples)
+    of_z, by_z = leading.of_products(samples)
+    spread = leading.variance_by(by_z)
     alpha = np.where(complete, samples.alpha - of_alpha, np.nan)
     z = np.where(complete, samples.z - of_z, np.nan)
     usual = spread.mean(axis=0)
@@ -134,7 +144,7 @@ def _estimate(
     assert live.start is not None
     steps = sign_steps(
         sets, samples.t, alpha, omega, residual.information, scale**2, rest, live.start,
-        alpha_bias=float(np.mean(np.einsum("nac,cd,nad->n", slopes, leading.covariance, slopes, optimize=True))) / 3.0,
+        alpha_bias=float(np.mean(np.trace(leading.variance_by(slopes), axis1=1, axis2=2))) / 3.0,
         null_bias=float(np.linalg.eigvalsh(usual)[-1]),
     )  # fmt: skip
     omega, probability = _signed(times, alpha, omega, sign_probabilities(steps))
@@ -142,10 +152,19 @@ def _estimate(
         wider = covariance + (scale**2 - 1.0)[:, None, None] * (rates.gain @ np.swapaxes(rates.gain, 1, 2))
     omega[rest], wider[rest], probability[rest] = 0.0, live.start.covariance, 1.0
     known = not live.start.sign_open
+    followed = None
+    if path is not None:
+        white = bounded_covariance(residual.information, scale, curvature)
+        white[rest] = live.start.covariance
+        gain = white / scale[:, None, None] ** 2 @ np.swapaxes(sensitivity @ _slopes(np.nan_to_num(omega)), 1, 2)
+        clear = clear_of_zero(omega, np.sqrt(np.diagonal(wider, axis1=1, axis2=2))) | rest  # elsewhere α goes on
+        single = SingleRates(np.where(clear[:, None], omega, np.nan), gain, white)
+        followed = live.estimate_of(times, live.follow_rates(single)).path
     found = RateEstimate(
         method, times, omega, wider, residual.squares + parity,
         np.where(np.isfinite(residual.squares), sets.products - 3 + np.where(np.isnan(samples.parity), 0, blind), 0),
         rest, channels=live.report, scale=ratio * scale, sign_probability=probability, start=live.start,
+        path=followed,
     )  # fmt: skip
     return replace(found, sign=decision(found, known=known))
 
@@ -163,15 +182,19 @@ def _most_probable(z: NDArray[np.float64], full: ChannelSet, white: NDArray[np.f
     """Fit z (n, m), whose noise and biases ``white`` (m, m) whitens."""
     slope = np.ascontiguousarray(white @ full.sensitivity)
     omega, covariance = rates_of_null_space(z @ white.T, slope)
+    with np.errstate(invalid="ignore"):
+        return _Rates(omega, covariance, covariance @ np.swapaxes(slope @ _slopes(omega), 1, 2) @ white)
+
+
+def _slopes(omega: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the slopes (n, 6, 3) of the products of rates (n, 3)."""
     x, y, w = omega.T
     zero = np.zeros_like(x)
-    jacobian = np.stack(  # (n, 6, 3) of the products
+    return np.stack(
         [np.stack([2 * x, zero, zero], -1), np.stack([zero, 2 * y, zero], -1), np.stack([zero, zero, 2 * w], -1),
          np.stack([y, x, zero], -1), np.stack([w, zero, x], -1), np.stack([zero, w, y], -1)],
         axis=1,
     )  # fmt: skip
-    with np.errstate(invalid="ignore"):
-        return _Rates(omega, covariance, covariance @ np.swapaxes(slope @ jacobian, 1, 2) @ white)
 
 
 def _closed_form(z: NDArray[np.float64], full: ChannelSet, white: NDArray[np.float64]) -> _Rates:

@@ -34,16 +34,16 @@ def slope_of(row, w, out):  # type: ignore[no-untyped-def]
 
 
 @njit(**INNER)
-def shown_rate(inverse, z, x, bias, out):  # type: ignore[no-untyped-def]
+def shown_rate(inverse, z, x, first, bias, out):  # type: ignore[no-untyped-def]
     """Fill in a rate (3,) that products z (m,) may show without the biases in the state x: along the largest square.
 
-    ``inverse`` (6, m) gives the products, and ``bias`` (m, m) the biases in z of those in x[9:].
+    ``inverse`` (6, m) gives the products, and ``bias`` (m, m) the biases in z of those in x[first:].
     """
     shown = np.zeros(6)
     for i in range(len(z)):
         value = z[i]
         for j in range(len(z)):
-            value -= bias[i, j] * x[9 + j]
+            value -= bias[i, j] * x[first + j]
         for q in range(6):
             shown[q] += inverse[q, i] * value
     axis = 0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +13,11 @@ from gfimu.array.array import AccelerometerArray
 from gfimu.array.linear_solution import LinearSolution
 from gfimu.base.short_repr import short_repr
 from gfimu.rate.disagreement import Disagreement
-from gfimu.rate.result import ChannelReport
+from gfimu.rate.result import BodyPath, ChannelReport
 from gfimu.rate.sensing import SensorErrors
+
+if TYPE_CHECKING:
+    from gfimu.rate.path_start import PathStart
 
 __all__ = ["RateProblem", "RateSolution"]
 
@@ -43,6 +46,10 @@ class RateProblem:
         Gyro to fuse, rad/s; NaN where it is saturated or missing.
     temperature : ndarray, shape (n,), optional
         Temperature of the chips, °C.
+    path : PathStart, optional
+        Where attitude, velocity and position start.
+    levelled : bool
+        Whether the biases of the first rest were taken off the readings.
     progress : callable, optional
         Called with the share of the work done so far.
     """
@@ -56,6 +63,8 @@ class RateProblem:
     omega0: NDArray[np.float64] | None
     gyro: NDArray[np.float64] | None = None
     temperature: NDArray[np.float64] | None = None
+    path: PathStart | None = None
+    levelled: bool = False
     progress: Callable[[float], object] | None = None
 
     __repr__ = short_repr
@@ -67,7 +76,8 @@ class RateSolution:
 
     ``rest`` marks the samples recognised as rest, where the method does that. ``noise_scale`` (n,) is how much larger
     than stated the noise was found, and ``sign_probability`` (n,) how sure the sign of each rate is, where that was
-    judged. ``remarks`` are figures and sentences about how it was found, by name, for the estimate's metadata.
+    judged. ``path`` holds attitude, velocity, position, α and p, where the method follows them. ``remarks`` are figures
+    and sentences about how it was found, by name, for the estimate's metadata.
     """
 
     omega: NDArray[np.float64]
@@ -75,6 +85,7 @@ class RateSolution:
     rest: NDArray[np.bool_] | None = None
     noise_scale: NDArray[np.float64] | None = None
     sign_probability: NDArray[np.float64] | None = None
+    path: BodyPath | None = None
     remarks: Mapping[str, Any] = field(default_factory=dict)
 
     __repr__ = short_repr

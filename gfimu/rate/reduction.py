@@ -66,9 +66,9 @@ class Reduction:
     def _samples(self, t: NDArray[np.float64], rows: NDArray[np.float64], gyro: NDArray[np.float64]) -> Samples:
         n, m, q = len(t), self.sets.products, len(self.considered)
         return Samples(
-            t, np.zeros((n, m)), np.zeros((n, 3)), np.zeros((n, 3)), np.full((n, 2), np.nan),
+            t, np.zeros((n, m)), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3)), np.full((n, 2), np.nan),
             np.zeros(n, dtype=np.int64), np.full(n, np.nan), gyro, np.zeros(n, dtype=np.int64),
-            np.zeros(n), np.zeros((n, 12 if q else 0)), np.zeros((n, 3, q)), np.zeros((n, 3, q)), np.zeros((n, m, q)),
+            np.zeros(n), np.zeros((n, 12 if q else 0)), *(np.zeros((n, rows, q)) for rows in (3, 3, 3, m)),
         )  # fmt: skip
 
     def reduce(
@@ -127,18 +127,21 @@ class Reduction:
                 continue
             samples.channel_set[here] = place
             samples.alpha[here] = clean[here] @ channels.alpha_rows.T
+            samples.force[here] = clean[here] @ channels.force_rows.T
             samples.z[here] = clean[here] @ channels.product_rows.T
             if len(self.considered):
                 samples.features[here] = features_of(self.sets.array, clean[here], present[np.argmax(here)])
             if place:
                 samples.alpha[here] -= means[here] @ channels.alpha_parity.T
+                samples.force[here] -= means[here] @ channels.force_parity.T
                 samples.z[here] -= means[here] @ channels.product_parity.T
         seen = samples.channel_set >= 0
         self._blind += int(np.count_nonzero(~seen))
         if not seen.all():  # α is held
             last = np.maximum.accumulate(np.where(seen, np.arange(n), -1))
-            held = before.alpha[-1] if len(before.t) else np.zeros(3)
-            samples.alpha[:] = np.where((last >= 0)[:, None], samples.alpha[np.maximum(last, 0)], held)
+            for new, old in ((samples.alpha, before.alpha), (samples.force, before.force)):
+                held = old[-1] if len(before.t) else np.zeros(3)
+                new[:] = np.where((last >= 0)[:, None], new[np.maximum(last, 0)], held)
         keep = min(5, len(before.t))
         steps = np.diff(np.concatenate([before.t[len(before.t) - keep :], t]))
         self._gaps += int(np.count_nonzero(steps[max(keep - 1, 0) :] > _GAP * self._period))
@@ -165,6 +168,7 @@ class Reduction:
                 here = samples.channel_set[first:] == place
                 channels = self.sets.sets[place]
                 samples.alpha_errors[rows[here]] = self.considered.of_rows(channels.alpha_rows, features[first:][here])
+                samples.force_errors[rows[here]] = self.considered.of_rows(channels.force_rows, features[first:][here])
                 samples.product_errors[rows[here]] = self.considered.of_rows(channels.product_rows, motion[here])
 
     def _add_timing(

@@ -38,6 +38,8 @@ class RateMethod:
         α integrated from a known start: the error of a bias grows with time, and no measurement of ω bounds it.
     uses_later_samples : bool
         Later samples correct earlier ones: no method for a stream.
+    follows_path : bool
+        The solver takes ``path`` by name as well, and then also gives attitude, velocity and position.
     """
 
     name: str
@@ -46,6 +48,7 @@ class RateMethod:
     recursive: bool = False
     open_loop: bool = False
     uses_later_samples: bool = False
+    follows_path: bool = False
 
     def refuse_gyro(self) -> None:
         """Raise `InputError` unless the method can fuse a gyro."""
@@ -62,11 +65,24 @@ class RateMethod:
 
 
 _RECORDS = (
-    RateMethod("integrate", solvers.integrate_from_rest, "α", open_loop=True),
-    RateMethod("algebraic", solvers.algebraic_from_rest, "null space, sample by sample"),
-    RateMethod("ml", solvers.maximum_likelihood_from_rest, "null space, sample by sample"),
-    RateMethod("filter", solvers.filter_readings, "α, null space, rest, gyro; samples so far", recursive=True),
-    RateMethod("smoother", solvers.smooth_readings, "the same, all samples", recursive=True, uses_later_samples=True),
+    RateMethod("integrate", solvers.integrate_from_rest, "α", open_loop=True, follows_path=True),
+    RateMethod("algebraic", solvers.algebraic_from_rest, "null space, sample by sample", follows_path=True),
+    RateMethod("ml", solvers.maximum_likelihood_from_rest, "null space, sample by sample", follows_path=True),
+    RateMethod(
+        "filter",
+        solvers.filter_readings,
+        "α, null space, rest, gyro; samples so far",
+        recursive=True,
+        follows_path=True,
+    ),
+    RateMethod(
+        "smoother",
+        solvers.smooth_readings,
+        "the same, all samples",
+        recursive=True,
+        uses_later_samples=True,
+        follows_path=True,
+    ),
 )
 
 RATE_METHODS: Mapping[str, RateMethod] = MappingProxyType({method.name: method for method in _RECORDS})

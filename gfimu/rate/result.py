@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field, fields, replace
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.base.results import Panel, PlottedResult, Series, axis_series
-from gfimu.base.short_repr import joined
+from gfimu.base.short_repr import joined, short_repr
 from gfimu.recording.sample_times import timing
 
 if TYPE_CHECKING:
     from gfimu.rate.start import Start
 
 __all__ = [
-    "DECIDED", "ChannelReport", "RateEstimate", "SignDecision", "clear_of_zero", "full_covariance", "joined_estimates",
-    "undecided",
+    "DECIDED", "BodyPath", "ChannelReport", "RateEstimate", "SignDecision", "clear_of_zero", "full_covariance",
+    "joined_estimates", "undecided",
 ]  # fmt: skip
 
 DECIDED = 0.99
@@ -107,6 +107,49 @@ class ChannelReport:
 
 
 @dataclass(frozen=True)
+class BodyPath:
+    """Attitude, velocity, position, angle, α and p of a body along a run, each with its standard deviation.
+
+    Parameters
+    ----------
+    quaternion : ndarray, shape (n, 4)
+        Attitude (w, x, y, z), body to world.
+    attitude_std : ndarray, shape (n, 3)
+        About the axes of the world, rad: two of tilt, and the heading.
+    velocity, velocity_std, position, position_std : ndarray, shape (n, 3)
+        Of the origin in the world since the first sample, m/s and m.
+    angle, angle_std : ndarray, shape (n,)
+        Angle turned about the axis asked for, rad.
+    alpha, alpha_std : ndarray, shape (n, 3)
+        Angular acceleration, body axes, rad/s², without the biases that the estimate found.
+    p, p_std : ndarray, shape (n, 3)
+        Specific force of the origin, body axes, m/s², likewise.
+    """
+
+    quaternion: NDArray[np.float64]
+    attitude_std: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    velocity_std: NDArray[np.float64]
+    position: NDArray[np.float64]
+    position_std: NDArray[np.float64]
+    angle: NDArray[np.float64]
+    angle_std: NDArray[np.float64]
+    alpha: NDArray[np.float64]
+    alpha_std: NDArray[np.float64]
+    p: NDArray[np.float64]
+    p_std: NDArray[np.float64]
+
+    __repr__ = short_repr
+
+    def known_at(self, known: NDArray[np.bool_]) -> Self:
+        """Return the path with NaN where a sample is not ``known`` (n,)."""
+        columns = {one.name: getattr(self, one.name) for one in fields(self)}
+        return type(self)(
+            **{name: np.where(known.reshape(-1, *[1] * (v.ndim - 1)), v, np.nan) for name, v in columns.items()}
+        )
+
+
+@dataclass(frozen=True)
 class RateEstimate(PlottedResult):
     """Angular rate with its standard deviation, sample by sample.
 
@@ -127,6 +170,8 @@ class RateEstimate(PlottedResult):
         The same by the noise as stated, or as measured where the channels agree, before ``scale`` enlarges it.
     start : Start or None
         How the run starts, as inferred.
+    path : BodyPath or None
+        Attitude, velocity and position, where they were asked for.
     nis_dof : ndarray of int, shape (n,)
         Degrees of freedom of ``nis``; zero where nothing was compared.
     rest : ndarray of bool, shape (n,)
@@ -173,6 +218,7 @@ class RateEstimate(PlottedResult):
     sign_probability: NDArray[np.float64] | None = None
     stated_nis: NDArray[np.float64] | None = None
     start: Start | None = None
+    path: BodyPath | None = None
     unit: str = "rad/s"
     format_version: int = 1
 

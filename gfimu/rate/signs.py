@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from gfimu.rate.body_rate import LIKELIHOOD, WANDER, Carried, Estimates, Samples
 from gfimu.rate.channel_sets import ChannelSets
+from gfimu.rate.constants import Constants
 from gfimu.rate.maximum_likelihood import rates_of_null_space
 from gfimu.rate.residual import bounded_covariance, least_curvature, residual_of
 from gfimu.rate.result import DECIDED, RateEstimate, SignDecision, clear_of_zero, full_covariance
@@ -70,33 +71,34 @@ class SignJudge:
         self._chain = SignChain(period)
 
     def of_recording(
-        self, samples: Samples, carried: Carried, out: Estimates, rest: NDArray[np.bool_]
+        self, samples: Samples, constants: Constants, out: Estimates, rest: NDArray[np.bool_]
     ) -> NDArray[np.float64]:
         """Return the probability (n,) that each rate, and not its mirror image, is the true one, by all samples."""
-        steps, covariance = self._steps(samples, carried, out, rest)
+        steps, covariance = self._steps(samples, constants, out, rest)
         return self._of_rates(sign_probabilities(steps), steps, covariance, out)
 
     def of_stream(
-        self, samples: Samples, carried: Carried, out: Estimates, rest: NDArray[np.bool_]
+        self, samples: Samples, constants: Constants, out: Estimates, rest: NDArray[np.bool_]
     ) -> NDArray[np.float64]:
         """Return the same of further samples of a stream, by those so far."""
-        steps, covariance = self._steps(samples, carried, out, rest)
+        steps, covariance = self._steps(samples, constants, out, rest)
         return self._of_rates(self._chain.push(steps), steps, covariance, out)
 
     def _steps(
-        self, samples: Samples, carried: Carried, out: Estimates, rest: NDArray[np.bool_]
+        self, samples: Samples, constants: Constants, out: Estimates, rest: NDArray[np.bool_]
     ) -> tuple[SignSteps, NDArray[np.float64]]:
-        m, full = self._sets.products, self._sets.full
-        bias, spread = carried.x, carried.covariance
+        full = self._sets.full
         complete = (samples.channel_set == 0)[:, None]
-        alpha = np.where(complete, samples.alpha - bias[6:9], np.nan)
-        z = np.where(complete, samples.z - bias[9 : 9 + m], np.nan)
+        of_alpha, by_alpha = constants.of_alpha(samples)
+        of_products, by_products = constants.of_products(samples)
+        alpha = np.where(complete, samples.alpha - of_alpha, np.nan)
+        z = np.where(complete, samples.z - of_products, np.nan)
         omega, covariance = rates_of_null_space(z, full.sensitivity)
         residual = residual_of(z, full.sensitivity, omega, self._curvature)
         steps = sign_steps(
             self._sets, samples.t, alpha, omega, residual.information, out.inflation, rest, self._start,
-            alpha_bias=float(np.trace(spread[6:9, 6:9])) / 3.0,
-            null_bias=float(np.linalg.eigvalsh(spread[9 : 9 + m, 9 : 9 + m])[-1]),
+            alpha_bias=float(np.mean(np.trace(constants.variance_by(by_alpha), axis1=1, axis2=2))) / 3.0,
+            null_bias=float(np.linalg.eigvalsh(constants.variance_by(by_products).mean(axis=0))[-1]),
         )  # fmt: skip
         return steps, covariance * out.inflation[:, None, None]
 

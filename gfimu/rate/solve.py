@@ -1,4 +1,4 @@
-"""The angular rate of an estimate: α integrated, or a method that knows the errors of the sensors.
+"""The angular rate of an estimate: α integrated as it is read, or a method that knows the errors of the sensors.
 
 `solve_rate` is the way in. The methods themselves are in `gfimu.rate.solvers`.
 """
@@ -19,11 +19,14 @@ from gfimu.rate.feedback import integrate_rate_recursively
 from gfimu.rate.methods import estimate_rate
 from gfimu.rate.problem import RateProblem, RateSolution
 from gfimu.rate.registry import RateMethod
+from gfimu.rate.rest_test import RestTest
 from gfimu.rate.result import RateEstimate
 from gfimu.rate.sensing import SensorErrors
 from gfimu.rate.settings import FilterSettings
 
 __all__ = ["solve_rate"]
+
+_EXACT = 1e-9  # numerical: uncertainty of a rate at the start that is taken as given, rad/s
 
 
 def solve_rate(method: RateMethod, problem: RateProblem) -> RateSolution:
@@ -32,7 +35,7 @@ def solve_rate(method: RateMethod, problem: RateProblem) -> RateSolution:
 
 
 def _integrate(problem: RateProblem) -> RateSolution:
-    """Integrate α from the first sample (paper, step 10 d); the variance of white noise adds up."""
+    """Integrate α from the first sample (paper, step 10 d), with every error of the sensors left in and in σ."""
     linear, t = problem.linear, problem.t_s
     start = np.zeros(3) if problem.omega0 is None else problem.omega0
     alpha = linear.motion[:, :3]
@@ -41,26 +44,14 @@ def _integrate(problem: RateProblem) -> RateSolution:
         omega = integrate_rate_recursively(t, alpha, leakage, linear.pattern, start)
     else:
         omega = integrate_rate(t, alpha, start)
-    return RateSolution(
-        omega, np.sqrt(_integrated_variance(t, np.where(np.isnan(omega), np.nan, linear.alpha_variance)))
+    reduced, _ = _of_living_channels(problem)
+    rest = RestTest() if problem.levelled else None  # what the biases taken off are uncertain by
+    settings = FilterSettings(start_omega=start, start_std=_EXACT, rest=rest, measure_noise=False)
+    known = estimate_rate(
+        reduced.array, t, reduced.readings, reduced.errors, method="integrate", settings=settings, path=problem.path
     )
-
-
-def _integrated_variance(t: NDArray[np.float64], variance: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Variance of the integral of white samples, each weighted with half the time to its neighbours; (n, 3)."""
-    valid = np.isfinite(variance).all(axis=1)
-    steps = np.diff(t[valid])
-    squared = variance[valid]
-    result = np.full_like(variance, np.nan)
-    if not valid.any():
-        return result
-    half_before = np.concatenate([[0.0], steps / 2.0])[:, None]
-    half_after = np.concatenate([steps / 2.0, [0.0]])[:, None]
-    passed = np.cumsum(squared * (half_before + half_after) ** 2, axis=0)
-    last = squared * (half_before**2 - (half_before + half_after) ** 2)  # the newest sample has no time after it yet
-    result[valid] = np.maximum(passed + last, 0.0)
-    result[np.argmax(valid)] = 0.0
-    return result
+    std = np.where(np.isfinite(omega), known.std, np.nan)
+    return RateSolution(omega, std, path=known.path)
 
 
 def _with_sensor_errors(method: RateMethod, problem: RateProblem) -> RateSolution:
@@ -70,7 +61,7 @@ def _with_sensor_errors(method: RateMethod, problem: RateProblem) -> RateSolutio
     settings = FilterSettings(start_omega=problem.omega0)
     found = estimate_rate(
         problem.array, problem.t_s, problem.readings, errors, method=method.name, settings=settings,
-        gyro=problem.gyro, progress=problem.progress,
+        gyro=problem.gyro, path=problem.path, progress=problem.progress,
     )  # fmt: skip
     disagreement = None if found.scale is None else sum_up_disagreement(found.scale, found.omega)
     start = found.start
@@ -97,7 +88,7 @@ def _with_sensor_errors(method: RateMethod, problem: RateProblem) -> RateSolutio
     probability = found.sign_probability
     if probability is None:
         probability = np.full(len(found), 0.5 if found.sign.state == "undecided" else 1.0)
-    return RateSolution(found.omega, std, found.rest, found.scale, probability, remarks)
+    return RateSolution(found.omega, std, found.rest, found.scale, probability, found.path, remarks)
 
 
 def _of_living_channels(problem: RateProblem) -> tuple[RateProblem, dict[str, str]]:

@@ -5,14 +5,16 @@ Each imports what it needs when it runs, so that a list of the methods does not 
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from gfimu.base.errors import InputError
+from gfimu.rate.result import SignDecision
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from gfimu.array.array import AccelerometerArray
+    from gfimu.rate.path_start import PathStart
     from gfimu.rate.result import RateEstimate
     from gfimu.rate.sensing import SensorErrors
     from gfimu.rate.settings import FilterSettings
@@ -27,64 +29,53 @@ __all__ = [
 
 
 def integrate_from_rest(
-    array: AccelerometerArray, t: ArrayLike, readings: ArrayLike, errors: SensorErrors, settings: FilterSettings
+    array: AccelerometerArray,
+    t: ArrayLike,
+    readings: ArrayLike,
+    errors: SensorErrors,
+    settings: FilterSettings,
+    *,
+    path: PathStart | None = None,
 ) -> RateEstimate:
-    """Integrate α (GF-IMU paper, step 10 d) with the mean over a leading rest as bias."""
+    """Integrate α (GF-IMU paper, step 10 d), with biases and errors of the channels by a leading rest."""
     import numpy as np
 
-    from gfimu.array.integration import integrate_rate
     from gfimu.rate.filter import increasing_times
     from gfimu.rate.live import LiveRateFilter
-    from gfimu.rate.result import RateEstimate
 
     times, period = increasing_times(t, "the integration")
-    live = LiveRateFilter(array, errors, period, settings)
-    if live.sets.full.leak.any():
-        raise InputError(
-            f"array {array.name!r} leaves products of the rate in α; use filter, or gfimu.estimate, which "
-            "feeds the rate back"
-        )
-    known = live.leading_rest(times, readings)
-    start, samples = live.start, live.samples
+    live = LiveRateFilter(array, errors, period, settings, open_loop=True, path=path)
+    live.leading_rest(times, readings)
+    start = live.start
     assert start is not None
-    of_alpha, slopes = known.of_alpha(samples)
-    alpha = np.where((samples.channel_set >= 0)[:, None], samples.alpha - of_alpha, np.nan)
-    omega = integrate_rate(times, alpha, start.omega)
-    first = start.covariance
+    found = live.estimate_of(times, live.follow_rates(), "integrate")
+    lost = live.samples.channel_set < 0
+    covariance = found.covariance
     if start.sign_open:  # the error is nought or twice the rate
-        first = first + 2.0 * np.outer(start.omega, start.omega)
-    steps = np.diff(times, prepend=times[0])
-    sums = np.cumsum(slopes * steps[:, None, None], axis=0)  # (n, 3, constants)
-    noise = live.sets.full.alpha_noise * (period * (times - times[0]))[:, None, None]
-    covariance = first + noise + sums @ known.covariance @ np.swapaxes(sums, 1, 2)
-    n = len(times)
-    none = np.zeros(n, dtype=np.int64)
-    chance = np.full(n, 0.5 if start.sign_open else 1.0)
-    return RateEstimate(
-        "integrate",
-        times,
-        omega,
-        covariance,
-        np.full(n, np.nan),
-        none,
-        known.rest,
-        sign_probability=chance,
-        start=start,
+        covariance = covariance + 2.0 * np.outer(start.omega, start.omega)
+    return replace(
+        found,
+        omega=np.where(lost[:, None], np.nan, found.omega),
+        covariance=covariance,
+        nis=np.full(len(times), np.nan),
+        scale=None,
+        sign_probability=np.full(len(times), 0.5 if start.sign_open else 1.0),
+        sign=SignDecision("undecided", 0.0) if start.sign_open else SignDecision(),
     )
 
 
-def algebraic_from_rest(*run: Any) -> RateEstimate:
+def algebraic_from_rest(*run: Any, **options: Any) -> RateEstimate:
     """Solve the products of ω sample by sample, as `gfimu.rate.per_sample.algebraic_rate`."""
     from gfimu.rate.per_sample import algebraic_rate
 
-    return algebraic_rate(*run)
+    return algebraic_rate(*run, **options)
 
 
-def maximum_likelihood_from_rest(*run: Any) -> RateEstimate:
+def maximum_likelihood_from_rest(*run: Any, **options: Any) -> RateEstimate:
     """Solve ω sample by sample, as `gfimu.rate.per_sample.maximum_likelihood_rate`."""
     from gfimu.rate.per_sample import maximum_likelihood_rate
 
-    return maximum_likelihood_rate(*run)
+    return maximum_likelihood_rate(*run, **options)
 
 
 def filter_readings(*run: Any, **options: Any) -> RateEstimate:

@@ -8,8 +8,9 @@ import numpy as np
 from scipy.special import chdtri
 
 from gfimu.array.quadrature import even_weights
-from gfimu.rate.body_rate import Tuning
+from gfimu.rate.body_rate import Places, Tuning
 from gfimu.rate.channel_sets import ChannelSets
+from gfimu.rate.path import PathTuning
 from gfimu.rate.rest_test import RestTest
 from gfimu.rate.sensing import SensorErrors
 from gfimu.rate.settings import QUADRATURES, FilterSettings
@@ -65,8 +66,10 @@ def tuning_of(
     period: float,
     settings: FilterSettings,
     *,
-    errors_at: int,
+    at: Places,
     solved_in_motion: int,
+    path: PathTuning,
+    open_loop: bool = False,
     compares: bool = False,
     policy: FilterPolicy = FilterPolicy(),
 ) -> Tuning:
@@ -82,10 +85,14 @@ def tuning_of(
         Nominal sample period, s.
     settings : FilterSettings
         Rest, quadrature.
-    errors_at : int
-        Place of the first error of a channel in the state.
+    at : Places
+        Places in the state.
     solved_in_motion : int
         Components of the state that are estimated before the first rest.
+    path : PathTuning
+        Axis, gravity and rest of the path.
+    open_loop : bool
+        Whether α is integrated without measurements of the rate.
     compares : bool
         Whether two mirrored rates are followed.
     policy : FilterPolicy, optional
@@ -94,7 +101,7 @@ def tuning_of(
     m, d = sets.products, len(sets.parity_rows)
     sees = m > 0 and np.linalg.matrix_rank(sets.full.sensitivity, tol=1e-9) >= 3
     stencil = QUADRATURES[settings.quadrature]
-    window = max(4, round(policy.guard_s / period)) if sees else 0
+    window = max(4, round(policy.guard_s / period)) if sees and not open_loop else 0
     test = settings.rest or RestTest()
     half, second, parity = (_share(period, one) for one in (policy.innovation_s, policy.colour_s, policy.parity_s))
     return Tuning(
@@ -118,9 +125,11 @@ def tuning_of(
         guard_window=window,
         guard_limit=policy.guard_significance * np.sqrt(2.0 * m * window),
         guard_clear=policy.guard_clear,
-        errors_at=errors_at,
+        at=at,
         solved_in_motion=solved_in_motion,
+        open_loop=open_loop,
         compares=compares,
+        path=path,
     )
 
 
