@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from gfimu.rate.feedback import integrate_rate_recursively
     from gfimu.rate.filter import filter_rate, smooth_rate
     from gfimu.rate.health.fault import HealthCode
+    from gfimu.rate.path_start import PathStart
     from gfimu.rate.rest_test import RestTest, constant_readings
     from gfimu.rate.result import joined_estimates
     from gfimu.rate.sensing import ChannelTables

@@ -36,7 +36,20 @@ from numpy.typing import NDArray
 
 from gfimu.base.compiled import INNER, compiled
 from gfimu.rate.kernel import cholesky, predict, solve_lower, step_back, take
-from gfimu.rate.path import ROWS, TILT, Path, PathTuning, advance_path, motion_of, rest_on_path, settle_path, turned
+from gfimu.rate.path import (
+    POSITION,
+    ROWS,
+    TILT,
+    Path,
+    PathTuning,
+    advance_path,
+    level_anew,
+    motion_of,
+    rest_on_path,
+    settle_path,
+    tilt_is_vague,
+    turned,
+)  # fmt: skip
 from gfimu.rate.probable_rate import probable_rate, shown_rate, slope_of
 from gfimu.rate.rest_test import MOVES, RESTS
 
@@ -228,13 +241,14 @@ class Given(NamedTuple):
     rest: NDArray[np.bool_]  # (N,) a block of rest ends here
     restart: NDArray[np.bool_]  # (N,) it starts anew behind this sample
     attitude: NDArray[np.float64]  # (N, 4) where the path is followed
+    levelled: NDArray[np.bool_]  # (N,) tilt and velocity are found anew behind this sample
     single: SingleRates
 
     @classmethod
     def nothing(cls, single: SingleRates | None = None) -> Given:
         """Return what a first estimate is given: rates of single samples, or nothing."""
         flags = np.empty(0, dtype=np.bool_)
-        return cls(np.empty((0, 3)), np.empty(0), flags, flags, np.empty((0, 4)), single or no_rates())
+        return cls(np.empty((0, 3)), np.empty(0), flags, flags, np.empty((0, 4)), flags, single or no_rates())
 
 
 class Estimates(NamedTuple):
@@ -336,6 +350,8 @@ def follow(samples, given, first, last, tables, tuning, carried, out, offset, re
             counts[COMPLETE] += 1
             for i in range(m):
                 carried.sums[3 + i] += samples.z[k, i]
+        vague = False
+        begin = max(k - tuning.path.rest_window + 1, 0)
         rests = int(given.rest[k]) if again else _rests(samples, k, tables, tuning, carried)
         if rests == 1:
             counts[SOLVED] = n
@@ -344,8 +360,9 @@ def follow(samples, given, first, last, tables, tuning, carried, out, offset, re
                 take(x, p, unit, -x[a], tuning.rest_variance, counts[SOLVED], gain, record, row)
                 unit[a] = 0.0
             if follows_path:
-                begin = max(k - tuning.path.rest_window + 1, 0)
-                rest_on_path(samples, begin, k, tables, tuning, carried, n, inflation, gain, record, row)
+                vague = given.levelled[k] if again else tilt_is_vague(carried)
+                if not vague:
+                    rest_on_path(samples, begin, k, tables, tuning, carried, n, inflation, gain, record, row)
         counts[STARTED] = 1
         counts[LAST_SET] = place
         scalars[TIME] = samples.t[k]
@@ -382,6 +399,9 @@ def follow(samples, given, first, last, tables, tuning, carried, out, offset, re
                 out.path.variance[row, i] = p[TILT + i, TILT + i]
             path = out.path
             motion_of(samples, k, tables, tuning, x, p, inflation, path.motion[row], path.motion_variance[row])
+            path.levelled[row] = vague
+            if vague:
+                level_anew(samples, begin, k, tables, tuning, carried, inflation, gain, record)
 
 
 @njit(**INNER)
@@ -1033,6 +1053,11 @@ def smooth_back(samples, record, restart, first, last, tables, tuning, end, adjo
         if restart[k]:
             adjoint[:] = 0.0
             curvature[:] = 0.0
+        if r > TILT and path.levelled[k]:
+            for row in range(TILT, POSITION):
+                adjoint[row] = 0.0
+                curvature[row, :] = 0.0
+                curvature[:, row] = 0.0
         step_back(record, k - first, adjoint, curvature, value, spread)
         for a in range(3):
             out.omega[k, a] = x[a] = value[a]

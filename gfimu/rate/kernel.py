@@ -126,9 +126,9 @@ def measure(x, p, slope, innovation, variance, solved, gain):  # type: ignore[no
 
 @njit(**INNER)
 def take(x, p, slope, innovation, variance, solved, gain, record, row):  # type: ignore[no-untyped-def]
-    """Take a scalar measurement and remember it; returns the inverse of the innovation's variance."""
+    """Take a scalar measurement and remember it, but in a row −1; returns the inverse of the innovation's variance."""
     inverse = measure(x, p, slope, innovation, variance, solved, gain)
-    if len(record.used) > 0:
+    if len(record.used) > 0 and row >= 0:
         used = record.used[row]
         for j in range(len(x)):
             record.slope[row, used, j] = slope[j]

@@ -459,7 +459,7 @@ class LiveRateFilter:
             tables, gain = self.sets.tables(), np.zeros(len(carried.x))
             rest_on_path(
                 samples, 0, self._resumed - 1, tables, self.tuning, carried, len(carried.x), 1.0, gain,
-                self._record(0), 0,
+                self._record(0), -1,
             )  # fmt: skip
             with_attitude(carried, settled(carried))
 
@@ -516,7 +516,7 @@ class LiveRateFilter:
         start.counts[SOLVED] = len(start.x)
         for _ in range(_PASSES):
             before, attitude = out.omega.copy(), out.path.attitude.copy()
-            given = Given(before, out.inflation, out.rest, out.restart, attitude, no_rates())
+            given = Given(before, out.inflation, out.rest, out.restart, attitude, out.path.levelled, no_rates())
             again = self._resting(0, len(out.nis))
             end = start.copy() if self._path is None else with_attitude(start.copy(), attitude[0])
             kept = self._forward(end, given, again, report)

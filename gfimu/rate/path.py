@@ -8,7 +8,8 @@ the Earth by Ω, from sample k − 1 to k, Δt later,
     v ← v + ∫(R p) + Δt (g − 2 Ω × v),   s ← s + ∫v,   ψ ← ψ + ½ Δt n·(ω_{k−1} + ω_k − 2 Rᵀ Ω)
 
 p = P y − b_p − P D φ, and the integral of R p is that of the parabola through three samples. θ is taken into R after
-each sample. Where the body rests, v is zero and R p points up and measures g: that shows tilt and biases of p.
+each sample. Where the body rests, v is zero and R p points up and measures g: that shows tilt and biases of p. A tilt
+so uncertain that θ × R p is far from linear is found anew from R p alone, and nothing before it is corrected by it.
 """
 
 from __future__ import annotations
@@ -24,12 +25,15 @@ from gfimu.rate.kernel import take
 from gfimu.rate.probable_rate import slope_of
 
 __all__ = [
-    "ANGLE", "POSITION", "ROWS", "TILT", "VELOCITY", "Path", "PathTuning", "advance_path", "motion_of", "rest_on_path",
-    "settle_path", "turned",
+    "ANGLE", "POSITION", "ROWS", "TILT", "VELOCITY", "Path", "PathTuning", "advance_path", "level_anew", "motion_of",
+    "rest_on_path", "settle_path", "tilt_is_vague", "turned",
 ]  # fmt: skip
 
 TILT, VELOCITY, POSITION, ANGLE = 6, 9, 12, 15  # places in the state
 ROWS = 10  # of the path in the state
+_VAGUE = 0.05  # rad², of the two tilts together, from which the tilt is found anew at rest: 9° each
+_LOST = 0.1  # rad², of the heading, from which the same is done: 18°
+_TILTED = 0.3  # rad, uncertainty of a tilt before gravity is measured from which it decides nothing
 _EVEN = 0.01  # numerical: relative difference of two steps up to which a parabola goes through three samples
 
 
@@ -53,11 +57,13 @@ class Path(NamedTuple):
     variance: NDArray[np.float64]  # (N, 10) of θ, v, s, ψ
     motion: NDArray[np.float64]  # (N, 6) α, p
     motion_variance: NDArray[np.float64]  # (N, 6)
+    levelled: NDArray[np.bool_]  # (N,) tilt and velocity were found anew behind this sample
 
     @classmethod
     def empty(cls, n: int) -> Path:
         """Return room for n samples."""
-        return cls(*(np.empty((n, width)) for width in (4, 4, 7, ROWS, 6, 6)))
+        attitude, ahead, line, variance, motion, spread = (np.empty((n, width)) for width in (4, 4, 7, ROWS, 6, 6))
+        return cls(attitude, ahead, line, variance, motion, spread, np.zeros(n, dtype=np.bool_))
 
 
 @njit(**INNER)
@@ -220,7 +226,7 @@ def advance_path(samples, given, k, tables, tuning, carried, step, level, transi
         total += path.axis[c] * noise[ANGLE, c]
     noise[ANGLE, ANGLE] = half * total
 
-    power = max(samples.channel_set[k], 0)
+    place = max(samples.channel_set[k], 0)
     for a in range(3):  # v and s
         b, c = (a + 1) % 3, (a + 2) % 3
         for j in range(n):
@@ -238,7 +244,7 @@ def advance_path(samples, given, k, tables, tuning, carried, step, level, transi
         total = 0.0
         for d in range(3):
             for e in range(3):
-                total += middle[a, d] * tables.force_noise[power, d, e] * middle[a, e]
+                total += middle[a, d] * tables.force_noise[place, d, e] * middle[a, e]
         noise[VELOCITY + a, VELOCITY + a] = step * step * level * total
 
     for a in range(3):  # θ at either end, as it is: nought where the attitude is the filter's own
@@ -274,7 +280,7 @@ def advance_path(samples, given, k, tables, tuning, carried, step, level, transi
 def rest_on_path(samples, first, last, tables, tuning, carried, solved, level, gain, record, row):  # type: ignore[no-untyped-def]
     """Take the mean of p over samples ``first`` to ``last`` at rest for gravity, and the velocity for zero.
 
-    The record is filled where it has room.
+    The record is filled where it has room. In a row −1 the body was levelled by the same samples before.
     """
     x, p, at, path = carried.x, carried.covariance, tuning.at, tuning.path
     n, count = len(x), 0
@@ -292,13 +298,13 @@ def rest_on_path(samples, first, last, tables, tuning, carried, solved, level, g
     old[TILT : TILT + 3] = 0.0
     _matrix(carried.attitude, matrix)
     _times(matrix, mean, up)
-    tilt = p[TILT, TILT] + p[TILT + 1, TILT + 1] + p[TILT + 2, TILT + 2]
-    bent = (0.5 * path.gravity * tilt) ** 2  # of the second-order terms of θ × R p
+    tilt, heading = p[TILT, TILT] + p[TILT + 1, TILT + 1], p[TILT + 2, TILT + 2]
+    bent = 0.0 if row < 0 else 0.25 * path.gravity**2 * tilt * (tilt + heading)  # of the second-order terms of θ × R p
     for a in range(3):
-        b, c = (a + 1) % 3, (a + 2) % 3
         row_of[:] = 0.0
         if count > 0:
-            row_of[TILT + b], row_of[TILT + c] = up[c], -up[b]
+            if a < 2:  # of the true g, as noise across it would seem to show the heading
+                row_of[TILT + 1 - a] = path.gravity if a == 0 else -path.gravity
             variance = path.still_variance + bent
             for d in range(3):
                 for j in range(at.alpha, n):
@@ -323,6 +329,47 @@ def settle_path(carried):  # type: ignore[no-untyped-def]
         carried.attitude[i] = new[i]
     for a in range(3):
         carried.x[TILT + a] = 0.0
+
+
+@njit(**INNER)
+def tilt_is_vague(carried):  # type: ignore[no-untyped-def]
+    """Whether gravity would move the attitude too far for one linear step, or its heading is unknown.
+
+    An unknown heading turns the noise of p across the vertical about, which would seem to show it.
+    """
+    p = carried.covariance
+    return p[TILT, TILT] + p[TILT + 1, TILT + 1] > _VAGUE or p[TILT + 2, TILT + 2] > _LOST
+
+
+@njit(**INNER)
+def level_anew(samples, first, last, tables, tuning, carried, level, gain, record):  # type: ignore[no-untyped-def]
+    """Find the tilt from the mean of p over samples ``first`` to ``last`` at rest, by the smallest turn, and stop."""
+    x, p = carried.x, carried.covariance
+    settle_path(carried)
+    mean, force, up, turn = np.zeros(3), np.empty(3), np.empty(3), np.zeros(3)
+    slope, matrix, new = np.zeros((3, len(x))), np.empty((3, 3)), np.empty(4)
+    for k in range(first, last + 1):
+        _force(samples, k, tables, tuning, x, force, slope)
+        for a in range(3):
+            mean[a] += force[a] / (last + 1 - first)
+    _matrix(carried.attitude, matrix)
+    _times(matrix, mean, up)
+    across = np.sqrt(up[0] * up[0] + up[1] * up[1])
+    if across > 0.0:
+        angle = np.arctan2(across, up[2])
+        turn[0], turn[1] = angle * up[1] / across, -angle * up[0] / across
+    turned(carried.attitude, turn, True, new)
+    for i in range(4):
+        carried.attitude[i] = new[i]
+    vague = p[TILT, TILT] + p[TILT + 1, TILT + 1]
+    heading = p[TILT + 2, TILT + 2] + vague
+    for row in range(TILT, POSITION):
+        for j in range(len(x)):
+            p[row, j] = p[j, row] = 0.0
+        p[row, row] = _TILTED * _TILTED if row < VELOCITY else vague
+        x[row] = 0.0
+    p[TILT + 2, TILT + 2] = heading
+    rest_on_path(samples, first, last, tables, tuning, carried, len(x), level, gain, record, -1)
 
 
 @njit(**INNER)

@@ -19,6 +19,7 @@ from gfimu.base.compiled import compiled
 from gfimu.base.errors import GeometryError
 from gfimu.rate.algebraic import rate_from_products
 from gfimu.rate.body_rate import SingleRates
+from gfimu.rate.bounds.sample import omega_products_jacobian
 from gfimu.rate.channel_sets import ChannelSet
 from gfimu.rate.disagreement import measured_scale
 from gfimu.rate.filter import increasing_times
@@ -156,7 +157,11 @@ def _estimate(
     if path is not None:
         white = bounded_covariance(residual.information, scale, curvature)
         white[rest] = live.start.covariance
-        gain = white / scale[:, None, None] ** 2 @ np.swapaxes(sensitivity @ _slopes(np.nan_to_num(omega)), 1, 2)
+        gain = (
+            white
+            / scale[:, None, None] ** 2
+            @ np.swapaxes(sensitivity @ omega_products_jacobian(np.nan_to_num(omega)), 1, 2)
+        )
         clear = clear_of_zero(omega, np.sqrt(np.diagonal(wider, axis1=1, axis2=2))) | rest  # elsewhere α goes on
         single = SingleRates(np.where(clear[:, None], omega, np.nan), gain, white)
         followed = live.estimate_of(times, live.follow_rates(single)).path
@@ -183,18 +188,7 @@ def _most_probable(z: NDArray[np.float64], full: ChannelSet, white: NDArray[np.f
     slope = np.ascontiguousarray(white @ full.sensitivity)
     omega, covariance = rates_of_null_space(z @ white.T, slope)
     with np.errstate(invalid="ignore"):
-        return _Rates(omega, covariance, covariance @ np.swapaxes(slope @ _slopes(omega), 1, 2) @ white)
-
-
-def _slopes(omega: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the slopes (n, 6, 3) of the products of rates (n, 3)."""
-    x, y, w = omega.T
-    zero = np.zeros_like(x)
-    return np.stack(
-        [np.stack([2 * x, zero, zero], -1), np.stack([zero, 2 * y, zero], -1), np.stack([zero, zero, 2 * w], -1),
-         np.stack([y, x, zero], -1), np.stack([w, zero, x], -1), np.stack([zero, w, y], -1)],
-        axis=1,
-    )  # fmt: skip
+        return _Rates(omega, covariance, covariance @ np.swapaxes(slope @ omega_products_jacobian(omega), 1, 2) @ white)
 
 
 def _closed_form(z: NDArray[np.float64], full: ChannelSet, white: NDArray[np.float64]) -> _Rates:

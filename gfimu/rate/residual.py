@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.array.kinematics import omega_products
 from gfimu.base.compiled import compiled
-from gfimu.rate.bounds.sample import omega_products_jacobian
 
 __all__ = ["Residual", "bounded_covariance", "least_curvature", "residual_of"]
 
@@ -56,8 +56,8 @@ def least_curvature(sensitivity: NDArray[np.float64]) -> float:
     turn = np.pi * (1.0 + np.sqrt(5.0)) * number
     side = np.sqrt(1.0 - height**2)
     directions = np.column_stack([side * np.cos(turn), side * np.sin(turn), height])
-    sizes = [float(np.linalg.norm(0.5 * sensitivity @ omega_products_jacobian(u) @ u)) for u in directions]
-    return max(min(sizes), _LEAST_SHARE * max(sizes))
+    sizes = np.linalg.norm(omega_products(directions) @ sensitivity.T, axis=1)
+    return float(max(sizes.min(), _LEAST_SHARE * sizes.max()))
 
 
 def bounded_covariance(
