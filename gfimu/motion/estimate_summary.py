@@ -61,6 +61,9 @@ class PositionSummary(Declared):
 
     after_s: Annotated[float, figure("Time since the start of navigation.", "s")]
     position_m: Annotated[Floats, figure("Position at the end, world axes.", "m", head="position x y z")]
+    position_std_m: Annotated[
+        Floats | None, figure("Its standard deviation; null of methods without one.", "m", head="its σ, x y z")
+    ]
     equivalent_p_bias_m_s2: Annotated[Floats, figure("Constant bias of p that explains it, world axes.", "m/s²")]
     equivalent_rate_drift_deg_h: Annotated[
         float, figure("Constant drift of the rate that explains the horizontal part.", "°/h", head=_DRIFT)
@@ -72,9 +75,10 @@ class PositionSummary(Declared):
     def table(self) -> Table:
         """Return it as people read it."""
         shown = figures(f"Position in the world after {self.after_s:.4g} s", self, note=_STAYED)
-        place, *others = shown.rows
+        count = 1 if self.position_std_m is None else 2
+        places, others = shown.rows[:count], shown.rows[count:]
         bias = ("equivalent bias of p, x y z: 2 r/t²", cell(self.equivalent_p_bias_m_s2 / MILLI_G), "mg")
-        return replace(shown, rows=[place, bias, *others])
+        return replace(shown, rows=[*places, bias, *others])
 
 
 @dataclass(frozen=True)
@@ -93,10 +97,21 @@ class EstimateSummary(Declared):
     alpha_rms_rad_s2: Annotated[Floats, figure("Angular acceleration, rms.", "rad/s²", head="α, rms x y z")]
     omega_rms_rad_s: Annotated[Floats, figure("Angular rate, rms.", "rad/s", head="ω, rms x y z")]
     omega_std_rad_s: Annotated[
-        Floats, figure("Standard deviation of ω at the end, by noise alone.", "rad/s", head="σ of ω at the end, x y z")
+        Floats, figure("Standard deviation of ω at the end.", "rad/s", head="σ of ω at the end, x y z")
     ]
     angle_rad: Annotated[
         float, figure("Angle about the table's axis at the end.", "rad", head="angle at the end", form=".5g")
+    ]
+    angle_std_rad: Annotated[
+        float | None, figure("Its standard deviation; null of methods without one.", "rad", head="its σ", form=".3g")
+    ]
+    attitude_std_rad: Annotated[
+        Floats | None,
+        figure(
+            "Standard deviation of the attitude at the end: tilt, tilt, heading; null of methods without one.",
+            "rad",
+            head="σ of tilt x, y and heading at the end",
+        ),
     ]
     tacho_rmse_rad_s: Annotated[
         float | None,
@@ -224,6 +239,8 @@ def summarise(estimate: Estimate, recording: Recording, array: AccelerometerArra
         omega_rms_rad_s=_rms(estimate.omega[known]),
         omega_std_rad_s=estimate.omega_std[last],
         angle_rad=float(estimate.angle[last]),
+        angle_std_rad=None if estimate.angle_std is None else float(estimate.angle_std[last]),
+        attitude_std_rad=None if estimate.attitude_std is None else estimate.attitude_std[last],
         tacho_rmse_rad_s=None if tacho is None else _rms_difference(estimate.omega @ axis, tacho),
         gyro_rmse_rad_s=None if gyro is None else _rms_difference(estimate.omega, gyro),
         centripetal=None if unseen_motions(array) else centripetal_agreement(recording, array),
@@ -259,6 +276,7 @@ def _position(estimate: Estimate) -> PositionSummary | None:
     return PositionSummary(
         after_s=after,
         position_m=end,
+        position_std_m=None if estimate.position_std is None else estimate.position_std[known[-1]],
         equivalent_p_bias_m_s2=equivalent_p_bias(end, after),
         equivalent_rate_drift_deg_h=float(equivalent_rate_drift(math.hypot(end[0], end[1]), after)),
         earth_horizontal_rate_deg_h=None
