@@ -8,8 +8,6 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from gfimu.rate.result import SignDecision
-
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
@@ -42,6 +40,7 @@ def integrate_from_rest(
 
     from gfimu.rate.filter import increasing_times
     from gfimu.rate.live import LiveRateFilter
+    from gfimu.rate.result import SignDecision
 
     times, period = increasing_times(t, "the integration")
     live = LiveRateFilter(array, errors, period, settings, open_loop=True, path=path)
