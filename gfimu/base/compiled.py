@@ -31,7 +31,16 @@ def compiled(function: Callable[..., Any]) -> Any:
     cache = getattr(getattr(dispatcher, "_cache", None), "_cache_file", None)
     if cache is not None:  # numba has no public way to say this; None where nothing is kept
         cache._source_stamp = tuple(stamps)
+        _forget_unreadable(cache)
     return dispatcher
+
+
+def _forget_unreadable(cache: Any) -> None:
+    """Remove what is kept of a function by an earlier version whose classes are no longer where they were."""
+    try:
+        cache._load_index()
+    except (AttributeError, ImportError):
+        Path(cache._index_path).unlink(missing_ok=True)
 
 
 def _sources(function: Any, met: set[Any]) -> set[str]:

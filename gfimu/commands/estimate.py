@@ -118,8 +118,8 @@ def _doing(given: Mapping[str, Any]) -> str:
         doing, compiles = "estimating about one axis", must_compile(filter_axis)
     else:
         doing = f"estimating by {given['method']}"
-        compiles = rate_method(given["method"]).recursive and must_compile()
-    return f"{doing}; compiling the filter first, once: a minute or so" if compiles else doing
+        compiles = rate_method(given["method"]).follows_path and must_compile()
+    return f"{doing}; compiling the filter first, once: two minutes or so" if compiles else doing
 
 
 @command(report=_summary, gives=_estimate_of, doing=_doing)

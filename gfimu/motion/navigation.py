@@ -11,14 +11,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import Rotation
 
 from gfimu.array.integration import integrate_samples
 from gfimu.base.errors import InputError
 from gfimu.base.short_repr import short_repr
 from gfimu.base.units import STANDARD_GRAVITY
-from gfimu.motion.attitude import from_rotation, to_rotation
+from gfimu.motion.attitude import to_rotation
 from gfimu.motion.earth import EarthRotation
+from gfimu.rate.path_start import upright
 
 __all__ = ["NavigationResult", "level", "navigate"]
 
@@ -79,12 +79,10 @@ def level(p_at_rest: ArrayLike, *, heading: float = 0.0) -> NDArray[np.float64]:
     rows = rows[np.isfinite(rows).all(axis=1)]
     if len(rows) == 0:
         raise InputError("no complete sample of p to level with; give a stretch of rest without missing channels")
-    x, y, z = rows.mean(axis=0)
-    if not np.hypot(np.hypot(x, y), z) > 0:
+    mean = rows.mean(axis=0)
+    if not np.linalg.norm(mean) > 0:
         raise InputError("the mean of p is zero: there is no up to level to; give a stretch of rest")
-    roll = np.arctan2(y, z)
-    pitch = np.arctan2(-x, np.hypot(y, z))
-    return from_rotation(Rotation.from_euler("ZYX", [heading, pitch, roll]))
+    return upright(mean, heading)
 
 
 def navigate(

@@ -7,7 +7,7 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.rate.body_rate import Carried, Places, Samples
+from gfimu.rate.filter_state import Carried, Places, Samples
 
 __all__ = ["Constants"]
 

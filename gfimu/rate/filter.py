@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gfimu.array.array import AccelerometerArray
 from gfimu.base.errors import GeometryError, InputError
-from gfimu.rate.body_rate import LIKELIHOOD, Estimates
+from gfimu.rate.filter_state import LIKELIHOOD, Estimates
 from gfimu.rate.live import LiveRateFilter
 from gfimu.rate.path_start import PathStart
 from gfimu.rate.result import DECIDED, RateEstimate, SignDecision, clear_of_zero

@@ -16,7 +16,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from gfimu.array.array import AccelerometerArray
 from gfimu.base.errors import InputError
-from gfimu.rate.body_rate import (
+from gfimu.rate.body_rate import follow, smooth_back
+from gfimu.rate.channel_errors import ChannelErrors, features_of, usual_moments
+from gfimu.rate.channel_sets import ChannelSets
+from gfimu.rate.constants import Constants
+from gfimu.rate.filter_state import (
     LAST_ALPHA,
     RESTING,
     SOLVED,
@@ -30,20 +34,15 @@ from gfimu.rate.body_rate import (
     Samples,
     SingleRates,
     Tuning,
-    follow,
     no_rates,
-    smooth_back,
 )
-from gfimu.rate.channel_errors import ChannelErrors, features_of, usual_moments
-from gfimu.rate.channel_sets import ChannelSets
-from gfimu.rate.constants import Constants
 from gfimu.rate.increments import integrals
 from gfimu.rate.kernel import Record
 from gfimu.rate.measured_noise import measured_noise, timing_noise
 from gfimu.rate.path import ROWS, TILT, rest_on_path
 from gfimu.rate.path_start import PathStart, levelled, settled, with_attitude
 from gfimu.rate.reduction import Reduction
-from gfimu.rate.rest_test import MOVES, RESTS, RestJudge, RestTest, still_blocks
+from gfimu.rate.rest_test import DOUBTED, MOVES, RESTS, RestJudge, RestTest, still_blocks
 from gfimu.rate.result import (
     DECIDED,
     BodyPath,
@@ -87,7 +86,7 @@ class LiveRateFilter:
     open_loop : bool
         Whether α is integrated, with the biases of a first rest, and the rate is measured nowhere else.
     path : PathStart, optional
-        Where the path starts, if attitude, velocity and position are to be followed as well.
+        Where the path starts, if attitude, velocity and position of a whole recording are to be followed as well.
     progress : callable, optional
         Called with the share of each block of samples that is filtered, 0 to 1.
 
@@ -169,8 +168,10 @@ class LiveRateFilter:
         Raises
         ------
         InputError
-            If the shapes don't fit or time does not increase.
+            If the shapes don't fit, time does not increase, or the path is asked for.
         """
+        if self._path is not None:
+            raise InputError("a stream has no path: give the whole recording to filter_rate")
         times, rows, turning = self._checked(t, readings, gyro)
         found = []
         # The last sample of each block of the rest test by itself, so that the answer is that of single samples.
@@ -448,7 +449,7 @@ class LiveRateFilter:
             first = samples.t <= samples.t[0] + min(policy.level_s, enough)
             if self._resumed:
                 attitude, _ = levelled(samples.t[first], 0.0 * samples.alpha[first], samples.force[first], np.zeros(3))
-                std = policy.unknown_tilt
+                std = policy.unknown_tilt_std
             else:
                 attitude, std = levelled(samples.t[first], samples.alpha[first], samples.force[first], carried.x[:3])
         else:
@@ -582,7 +583,9 @@ class LiveRateFilter:
         prior = self.carried[0].prior[at.alpha : at.gyro, at.alpha : at.gyro]
         if self._resumed:
             verdicts = self._samples.still[2 * window - 1 :: window]
-            rest[: (1 + int(np.argmin(np.append(verdicts, MOVES) == RESTS))) * window] = True
+            moves = np.flatnonzero(np.append(verdicts, MOVES) < DOUBTED)[0]
+            rests = np.flatnonzero(verdicts[:moves] == RESTS)  # a block in doubt is rest where the rest goes on
+            rest[: (1 + (int(rests[-1]) + 1 if rests.size else 0)) * window] = True
         self._samples.still[~rest] = 0  # no other one is used
         usable = np.where(np.abs(self._raw) < self.errors.limits, self._raw, np.nan)[rest]
         return self._learnt(prior, usable[np.isfinite(usable).all(axis=1)]), rest

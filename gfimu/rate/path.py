@@ -1,15 +1,16 @@
 """The path of the body in the state of a filter, compiled: attitude, velocity, position, and the angle turned.
 
-Behind ω and ε the state has the error θ of the attitude in world axes (3), the velocity v and position s of the origin
-in the world (3 each) and the angle ψ about an axis n of the body. With R from the body to the world, which turns with
-the Earth by Ω, from sample k − 1 to k, Δt later,
+In the state of `gfimu.rate.body_rate` the path has ten components: the error θ of the attitude in world axes (3), the
+velocity v and position s of the origin in the world (3 each) and the angle ψ about an axis n of the body. R is the
+rotation from body to world; the world turns with the Earth at the rate Ω. From sample k − 1 to k, Δt later,
 
     R ← exp(−Ω Δt) R exp(½ Δt (ω_{k−1} + ω_k) + Δt²/12 (ω_{k−1} × ω_k + α_{k−1} − α_k))
     v ← v + ∫(R p) + Δt (g − 2 Ω × v),   s ← s + ∫v,   ψ ← ψ + ½ Δt n·(ω_{k−1} + ω_k − 2 Rᵀ Ω)
 
-p = P y − b_p − P D φ, and the integral of R p is that of the parabola through three samples. θ is taken into R after
-each sample. Where the body rests, v is zero and R p points up and measures g: that shows tilt and biases of p. A tilt
-so uncertain that θ × R p is far from linear is found anew from R p alone, and nothing before it is corrected by it.
+The specific force p is P y (`gfimu.rate.channel_sets`) less its bias b_p and the effect P D φ of the errors of the
+channels. The integral of R p is that of the parabola through three samples. After each sample θ is added to R and set
+to zero. At rest v is zero, R p points up and its size is g: both are measurements, which correct tilt and bias of p. An
+attitude too uncertain for a linear step is levelled anew from R p, and earlier samples are not corrected by that rest.
 """
 
 from __future__ import annotations
@@ -25,15 +26,13 @@ from gfimu.rate.kernel import take
 from gfimu.rate.probable_rate import slope_of
 
 __all__ = [
-    "ANGLE", "POSITION", "ROWS", "TILT", "VELOCITY", "Path", "PathTuning", "advance_path", "level_anew", "motion_of",
-    "rest_on_path", "settle_path", "tilt_is_vague", "turned",
+    "ANGLE", "POSITION", "ROWS", "TILT", "VELOCITY", "Path", "PathTuning", "advance_path", "attitude_is_lost",
+    "level_anew", "motion_of", "rest_on_path", "settle_path", "turned",
 ]  # fmt: skip
 
 TILT, VELOCITY, POSITION, ANGLE = 6, 9, 12, 15  # places in the state
 ROWS = 10  # of the path in the state
-_VAGUE = 0.05  # rad², of the two tilts together, from which the tilt is found anew at rest: 9° each
-_LOST = 0.1  # rad², of the heading, from which the same is done: 18°
-_TILTED = 0.3  # rad, uncertainty of a tilt before gravity is measured from which it decides nothing
+_TURNS = (TILT, TILT + 1, TILT + 2, ANGLE)
 _EVEN = 0.01  # numerical: relative difference of two steps up to which a parabola goes through three samples
 
 
@@ -46,6 +45,9 @@ class PathTuning(NamedTuple):
     stop_variance: float  # of the velocity at rest, (m/s)²
     still_variance: float  # of the mean acceleration over a block of rest, (m/s²)²
     rest_window: int  # samples of a block of rest
+    unknown_tilt: float  # variance of a tilt before gravity is measured that decides nothing, rad²
+    lost_tilt: float  # variance of a tilt from which it is found anew at rest, rad²
+    lost_heading: float  # variance of the heading from which the same is done, rad²
 
 
 class Path(NamedTuple):
@@ -112,7 +114,7 @@ def _times(matrix, vector, out):  # type: ignore[no-untyped-def]
 
 @njit(**INNER)
 def _correct(samples, k, tables, tuning, row, x, slope):  # type: ignore[no-untyped-def]
-    """Return a row of [α; p] of sample k without what the constants in the state x make of it.
+    """Return a component of [α; p] of sample k, corrected for the constants in the state x: biases, errors, products.
 
     ``slope`` (n,) is filled with its slope by the constants.
     """
@@ -120,22 +122,17 @@ def _correct(samples, k, tables, tuning, row, x, slope):  # type: ignore[no-unty
     along = np.empty(3)
     for i in range(at.alpha, len(x)):
         slope[i] = 0.0
-    if row < 3:
-        value = samples.alpha[k, a]
-        slope[at.alpha + a] = -1.0
-        for i in range(samples.z.shape[1]):
-            slope[at.products + i] = -tables.alpha_bias[place, a, i]
-        for j in range(at.errors, at.end):
-            slope[j] = -samples.alpha_errors[k, a, j - at.errors]
-        slope_of(tables.leak[place, a], x, along)
-    else:
-        value = samples.force[k, a]
-        slope[at.force + a] = -1.0
-        for i in range(samples.z.shape[1]):
-            slope[at.products + i] = -tables.force_bias[place, a, i]
-        for j in range(at.errors, at.end):
-            slope[j] = -samples.force_errors[k, a, j - at.errors]
-        slope_of(tables.force_leak[place, a], x, along)
+    first = at.alpha if row < 3 else at.force
+    value = samples.alpha[k, a] if row < 3 else samples.force[k, a]
+    errors = samples.alpha_errors if row < 3 else samples.force_errors
+    bias = tables.alpha_bias if row < 3 else tables.force_bias
+    leak = tables.leak if row < 3 else tables.force_leak
+    slope[first + a] = -1.0
+    for i in range(samples.z.shape[1]):
+        slope[at.products + i] = -bias[place, a, i]
+    for j in range(at.errors, at.end):
+        slope[j] = -errors[k, a, j - at.errors]
+    slope_of(leak[place, a], x, along)
     for j in range(at.alpha, len(x)):
         value += slope[j] * x[j]
     return value - 0.5 * (along[0] * x[0] + along[1] * x[1] + along[2] * x[2])
@@ -143,7 +140,7 @@ def _correct(samples, k, tables, tuning, row, x, slope):  # type: ignore[no-unty
 
 @njit(**INNER)
 def _force(samples, k, tables, tuning, x, out, slope):  # type: ignore[no-untyped-def]
-    """Fill in p (3,) of sample k without what the constants make of it, and its slope (3, n) by them."""
+    """Fill in p (3,) of sample k, corrected for the constants in the state x, and its slope (3, n) by them."""
     for a in range(3):
         out[a] = _correct(samples, k, tables, tuning, 3 + a, x, slope[a])
 
@@ -189,42 +186,37 @@ def advance_path(samples, given, k, tables, tuning, carried, step, level, transi
         for b in range(3):
             middle[a, b] = 0.5 * (before[a, b] + behind[a, b])
 
-    for a in range(3):  # θ and ψ
+    axes = np.empty((4, 3))  # of θ and ψ, in the body
+    for b in range(3):
+        axes[3, b] = path.axis[b]
+        for a in range(3):
+            axes[a, b] = middle[a, b]
+    for a in range(4):
+        row = _TURNS[a]
         for j in range(n):
             total = 0.0
             for b in range(3):
-                total += middle[a, b] * (transition[b, j] + (1.0 if b == j else 0.0))
-            transition[TILT + a, j] = half * total
-        transition[TILT + a, TILT + a] = 1.0
+                total += axes[a, b] * (transition[b, j] + (1.0 if b == j else 0.0))
+            transition[row, j] = half * total
+        transition[row, row] = 1.0
         for b in range(TILT):
             total = 0.0
             for c in range(3):
-                total += middle[a, c] * noise[c, b]
-            noise[TILT + a, b] = noise[b, TILT + a] = half * total
-        added[TILT + a] = vector[a]
+                total += axes[a, c] * noise[c, b]
+            noise[row, b] = noise[b, row] = half * total
+        added[row] = 0.0
         for b in range(3):
-            added[TILT + a] += half * middle[a, b] * (added[b] - start[b] - rate[b])
-    for j in range(n):
-        total = 0.0
-        for b in range(3):
-            total += path.axis[b] * (transition[b, j] + (1.0 if b == j else 0.0))
-        transition[ANGLE, j] = half * total
-    transition[ANGLE, ANGLE] = 1.0
-    for b in range(TILT + 3):
-        total = 0.0
-        for c in range(3):
-            total += path.axis[c] * noise[c, b]
-        noise[ANGLE, b] = noise[b, ANGLE] = half * total
-    for a in range(3):
-        for b in range(3):
+            added[row] += half * axes[a, b] * added[b]
+        for d in range(a + 1):
             total = 0.0
             for c in range(3):
-                total += middle[b, c] * noise[TILT + a, c]
-            noise[TILT + a, TILT + b] = half * total
-    total = 0.0
-    for c in range(3):
-        total += path.axis[c] * noise[ANGLE, c]
-    noise[ANGLE, ANGLE] = half * total
+                total += axes[d, c] * noise[row, c]
+            noise[row, _TURNS[d]] = noise[_TURNS[d], row] = half * total
+    for a in range(3):
+        added[TILT + a] += vector[a]
+        for b in range(3):
+            added[TILT + a] -= half * middle[a, b] * (start[b] + rate[b])
+            added[ANGLE] -= step * path.axis[a] * middle[b, a] * path.earth[b]
 
     place = max(samples.channel_set[k], 0)
     for a in range(3):  # v and s
@@ -264,16 +256,34 @@ def advance_path(samples, given, k, tables, tuning, carried, step, level, transi
             gained -= step * path.gravity
         moved = step * x[VELOCITY + a] + half * gained - step * step * (last[a] - first[a]) / 12.0
         added[VELOCITY + a], added[POSITION + a] = x[VELOCITY + a] + gained, x[POSITION + a] + moved
-    added[ANGLE] = 0.0
-    for a in range(3):
-        earth = middle[0, a] * path.earth[0] + middle[1, a] * path.earth[1] + middle[2, a] * path.earth[2]
-        added[ANGLE] += path.axis[a] * (half * added[a] - step * earth)
     for row in range(VELOCITY, ANGLE):
         for j in range(n):
             added[row] -= transition[row, j] * x[j]
     for a in range(3):
         carried.recent[a] = first[a]
     carried.recent[3] = step
+
+
+@njit(**INNER)
+def _mean_up(samples, first, last, tables, tuning, carried, up, slope):  # type: ignore[no-untyped-def]
+    """Fill in the mean of R p over samples at rest (3,), and the slope (3, n) of that of p by the constants.
+
+    Returns how many samples have it.
+    """
+    count = 0
+    mean, force, one, matrix = np.zeros(3), np.empty(3), np.zeros(slope.shape), np.empty((3, 3))
+    for k in range(first, last + 1):
+        if samples.channel_set[k] < 0:
+            continue
+        count += 1
+        _force(samples, k, tables, tuning, carried.x, force, one)
+        for a in range(3):
+            mean[a] += (force[a] - mean[a]) / count
+            for j in range(tuning.at.alpha, slope.shape[1]):
+                slope[a, j] += (one[a, j] - slope[a, j]) / count
+    _matrix(carried.attitude, matrix)
+    _times(matrix, mean, up)
+    return count
 
 
 @compiled
@@ -283,21 +293,12 @@ def rest_on_path(samples, first, last, tables, tuning, carried, solved, level, g
     The record is filled where it has room. In a row −1 the body was levelled by the same samples before.
     """
     x, p, at, path = carried.x, carried.covariance, tuning.at, tuning.path
-    n, count = len(x), 0
-    mean, force, slope, one = np.zeros(3), np.empty(3), np.zeros((3, n)), np.zeros((3, n))
-    for k in range(first, last + 1):
-        if samples.channel_set[k] < 0:
-            continue
-        count += 1
-        _force(samples, k, tables, tuning, x, force, one)
-        for a in range(3):
-            mean[a] += (force[a] - mean[a]) / count
-            for j in range(at.alpha, n):
-                slope[a, j] += (one[a, j] - slope[a, j]) / count
-    matrix, up, row_of, old = np.empty((3, 3)), np.empty(3), np.zeros(n), x.copy()
+    n = len(x)
+    up, slope = np.empty(3), np.zeros((3, n))
+    matrix, row_of, old = np.empty((3, 3)), np.zeros(n), x.copy()
     old[TILT : TILT + 3] = 0.0
     _matrix(carried.attitude, matrix)
-    _times(matrix, mean, up)
+    count = _mean_up(samples, first, last, tables, tuning, carried, up, slope)
     tilt, heading = p[TILT, TILT] + p[TILT + 1, TILT + 1], p[TILT + 2, TILT + 2]
     bent = 0.0 if row < 0 else 0.25 * path.gravity**2 * tilt * (tilt + heading)  # of the second-order terms of θ × R p
     for a in range(3):
@@ -322,7 +323,7 @@ def rest_on_path(samples, first, last, tables, tuning, carried, solved, level, g
 
 @njit(**INNER)
 def settle_path(carried):  # type: ignore[no-untyped-def]
-    """Take θ into the attitude."""
+    """Add the estimated error θ of the attitude to the attitude, and set it to zero."""
     new = np.empty(4)
     turned(carried.attitude, carried.x[TILT : TILT + 3], True, new)
     for i in range(4):
@@ -332,13 +333,14 @@ def settle_path(carried):  # type: ignore[no-untyped-def]
 
 
 @njit(**INNER)
-def tilt_is_vague(carried):  # type: ignore[no-untyped-def]
+def attitude_is_lost(tuning, carried):  # type: ignore[no-untyped-def]
     """Whether gravity would move the attitude too far for one linear step, or its heading is unknown.
 
     An unknown heading turns the noise of p across the vertical about, which would seem to show it.
     """
-    p = carried.covariance
-    return p[TILT, TILT] + p[TILT + 1, TILT + 1] > _VAGUE or p[TILT + 2, TILT + 2] > _LOST
+    p, path = carried.covariance, tuning.path
+    tilt = 0.5 * (p[TILT, TILT] + p[TILT + 1, TILT + 1])
+    return tilt > path.lost_tilt or p[TILT + 2, TILT + 2] > path.lost_heading
 
 
 @njit(**INNER)
@@ -346,14 +348,9 @@ def level_anew(samples, first, last, tables, tuning, carried, level, gain, recor
     """Find the tilt from the mean of p over samples ``first`` to ``last`` at rest, by the smallest turn, and stop."""
     x, p = carried.x, carried.covariance
     settle_path(carried)
-    mean, force, up, turn = np.zeros(3), np.empty(3), np.empty(3), np.zeros(3)
-    slope, matrix, new = np.zeros((3, len(x))), np.empty((3, 3)), np.empty(4)
-    for k in range(first, last + 1):
-        _force(samples, k, tables, tuning, x, force, slope)
-        for a in range(3):
-            mean[a] += force[a] / (last + 1 - first)
-    _matrix(carried.attitude, matrix)
-    _times(matrix, mean, up)
+    up, turn, new, slope = np.empty(3), np.zeros(3), np.empty(4), np.zeros((3, len(x)))
+    if _mean_up(samples, first, last, tables, tuning, carried, up, slope) == 0:
+        return
     across = np.sqrt(up[0] * up[0] + up[1] * up[1])
     if across > 0.0:
         angle = np.arctan2(across, up[2])
@@ -361,12 +358,12 @@ def level_anew(samples, first, last, tables, tuning, carried, level, gain, recor
     turned(carried.attitude, turn, True, new)
     for i in range(4):
         carried.attitude[i] = new[i]
-    vague = p[TILT, TILT] + p[TILT + 1, TILT + 1]
-    heading = p[TILT + 2, TILT + 2] + vague
+    lost = p[TILT, TILT] + p[TILT + 1, TILT + 1]
+    heading = p[TILT + 2, TILT + 2] + lost
     for row in range(TILT, POSITION):
         for j in range(len(x)):
             p[row, j] = p[j, row] = 0.0
-        p[row, row] = _TILTED * _TILTED if row < VELOCITY else vague
+        p[row, row] = tuning.path.unknown_tilt if row < VELOCITY else lost
         x[row] = 0.0
     p[TILT + 2, TILT + 2] = heading
     rest_on_path(samples, first, last, tables, tuning, carried, len(x), level, gain, record, -1)
@@ -374,7 +371,7 @@ def level_anew(samples, first, last, tables, tuning, carried, level, gain, recor
 
 @njit(**INNER)
 def motion_of(samples, k, tables, tuning, x, p, level, out, variance):  # type: ignore[no-untyped-def]
-    """Fill in α and p (6,) of sample k without what the constants of the state x make of it, and the variance (6,)."""
+    """Fill in α and p (6,) of sample k, corrected for the constants in the state x, and their variance (6,)."""
     at, place = tuning.at, max(samples.channel_set[k], 0)
     slope = np.zeros(len(x))
     for row in range(6):

@@ -1,4 +1,4 @@
-"""Where the path of a body starts, and what of it is asked for."""
+"""Start of the path of a body: its attitude at the first sample, and the world in which it is counted."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.rate.path import TILT, VELOCITY, PathTuning
 
 if TYPE_CHECKING:
-    from gfimu.rate.body_rate import Carried
+    from gfimu.rate.filter_state import Carried
 
-__all__ = ["PathPolicy", "PathStart", "levelled", "settled", "with_attitude"]
+__all__ = ["PathPolicy", "PathStart", "levelled", "settled", "upright", "with_attitude"]
 
 
 @dataclass(frozen=True)
 class PathPolicy:
-    """What is relied on where a body starts and rests.
+    """Uncertainty of the attitude at the start, and of rest.
 
     Parameters
     ----------
@@ -28,8 +28,11 @@ class PathPolicy:
         Time from the start over which the specific force shows what is up, s, at most.
     level_turn : float
         How far the bias of α may turn what is up in that time, rad.
-    unknown_tilt : float
+    unknown_tilt_std : float
         Uncertainty of an attitude that is levelled at rest, before gravity is measured there, rad: it decides nothing.
+    lost_tilt_std, lost_heading_std : float
+        Uncertainty of tilt or heading, rad, from which a rest levels the body anew: gravity would move a tilt of 9° too
+        far for a linear step, and noise turned by 18° of heading would seem to show it.
     mounting_std : float
         Uncertainty of a stated mounting, and of a levelled table under it, rad per axis: one degree.
     stop_std : float
@@ -40,7 +43,9 @@ class PathPolicy:
 
     level_s: float = 1.0
     level_turn: float = 0.05
-    unknown_tilt: float = 0.3
+    unknown_tilt_std: float = 0.3
+    lost_tilt_std: float = 0.16
+    lost_heading_std: float = 0.32
     mounting_std: float = 0.0175
     stop_std: float = 1e-3
     still_std: float = 1e-3
@@ -48,7 +53,7 @@ class PathPolicy:
 
 @dataclass(frozen=True)
 class PathStart:
-    """Where the path starts.
+    """Attitude at the first sample, and the world in which attitude, velocity and position are counted.
 
     Parameters
     ----------
@@ -79,7 +84,10 @@ class PathStart:
         policy = self.policy
         axis = np.asarray(self.axis, dtype=float) / np.linalg.norm(self.axis)
         earth = np.asarray(self.earth, dtype=float)
-        return PathTuning(axis, earth, self.gravity, policy.stop_std**2, policy.still_std**2, rest_window)
+        return PathTuning(
+            axis, earth, self.gravity, policy.stop_std**2, policy.still_std**2, rest_window,
+            policy.unknown_tilt_std**2, policy.lost_tilt_std**2, policy.lost_heading_std**2,
+        )  # fmt: skip
 
 
 def with_attitude(carried: Carried, attitude: NDArray[np.float64]) -> Carried:
@@ -98,6 +106,15 @@ def settled(carried: Carried) -> NDArray[np.float64]:
 
 def _rotation(attitude: NDArray[np.float64]) -> Rotation:
     return Rotation.from_quat(attitude[[1, 2, 3, 0]])
+
+
+def upright(up: NDArray[np.float64], heading: float = 0.0) -> NDArray[np.float64]:
+    """Return the attitude (w, x, y, z), body to world, in which a direction (3,) of the body points up.
+
+    ``heading`` is the angle of the body's x-axis about the world's z, rad.
+    """
+    roll, pitch = np.arctan2(up[1], up[2]), np.arctan2(-up[0], np.hypot(up[1], up[2]))
+    return Rotation.from_euler("ZYX", [heading, pitch, roll]).as_quat()[[3, 0, 1, 2]]
 
 
 def levelled(
@@ -124,7 +141,6 @@ def levelled(
     size = float(np.linalg.norm(mean))
     if not size > 0.0:
         return np.array([1.0, 0.0, 0.0, 0.0]), np.pi
-    roll, pitch = np.arctan2(mean[1], mean[2]), np.arctan2(-mean[0], np.hypot(mean[1], mean[2]))
-    attitude = Rotation.from_euler("ZYX", [0.0, pitch, roll]).as_quat()[[3, 0, 1, 2]]
+    attitude = upright(mean)
     across = up - up @ mean[:, None] / size**2 * mean
     return attitude, float(np.sqrt(np.mean(np.sum(across**2, axis=1)) / 2.0)) / size

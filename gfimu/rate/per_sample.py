@@ -18,11 +18,11 @@ from gfimu.array.array import AccelerometerArray
 from gfimu.base.compiled import compiled
 from gfimu.base.errors import GeometryError
 from gfimu.rate.algebraic import rate_from_products
-from gfimu.rate.body_rate import SingleRates
 from gfimu.rate.bounds.sample import omega_products_jacobian
 from gfimu.rate.channel_sets import ChannelSet
 from gfimu.rate.disagreement import measured_scale
 from gfimu.rate.filter import increasing_times
+from gfimu.rate.filter_state import SingleRates
 from gfimu.rate.live import LiveRateFilter
 from gfimu.rate.maximum_likelihood import rates_of_null_space
 from gfimu.rate.measured_noise import noise_ratio

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.rate.body_rate import Samples
 from gfimu.rate.channel_errors import ChannelErrors, features_of
 from gfimu.rate.channel_sets import ChannelSets
+from gfimu.rate.filter_state import Samples
 from gfimu.rate.result import ChannelReport
 from gfimu.rate.sensing import SensorErrors
 

@@ -12,9 +12,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.rate.body_rate import LIKELIHOOD, WANDER, Carried, Estimates, Samples
 from gfimu.rate.channel_sets import ChannelSets
 from gfimu.rate.constants import Constants
+from gfimu.rate.filter_state import LIKELIHOOD, WANDER, Carried, Estimates, Samples
 from gfimu.rate.maximum_likelihood import rates_of_null_space
 from gfimu.rate.residual import bounded_covariance, least_curvature, residual_of
 from gfimu.rate.result import DECIDED, RateEstimate, SignDecision, clear_of_zero, full_covariance

@@ -8,8 +8,8 @@ import numpy as np
 from scipy.special import chdtri
 
 from gfimu.array.quadrature import even_weights
-from gfimu.rate.body_rate import Places, Tuning
 from gfimu.rate.channel_sets import ChannelSets
+from gfimu.rate.filter_state import Places, Tuning
 from gfimu.rate.path import PathTuning
 from gfimu.rate.rest_test import RestTest
 from gfimu.rate.sensing import SensorErrors

@@ -110,8 +110,9 @@ def test_every_output_is_as_uncertain_as_it_says(method, name, kind):
         for output, score in world.scores(world.estimate(method)).items():
             squares.setdefault(output, []).append(np.nanmean(score[100:] ** 2))
     size = {output: float(np.sqrt(np.mean(values))) for output, values in squares.items()}
-    # α and p of 1100 samples are nearly independent. The others wander: ten runs of three axes are some 20 independent
-    # squares, whose root mean has a standard deviation of 16 %, and 10 of the angle, 22 %; three of them are allowed.
+    # α and p of 1100 samples are nearly independent. The others are integrals of noise: ten runs of three axes are some
+    # 20 independent squares, whose root mean has a standard deviation of 16 %, and 10 of the angle, 22 %; three of them
+    # are allowed.
     limits = {"alpha": (0.8, 1.2), "p": (0.6, 1.4), "angle": (0.3, 1.7)}
     for output, value in size.items():
         low, high = limits.get(output, (0.5, 1.5))

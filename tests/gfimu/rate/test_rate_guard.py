@@ -208,3 +208,17 @@ def test_an_inner_function_of_another_file_that_changes_is_compiled_anew(tmp_pat
         importlib.invalidate_caches()
         results.append(importlib.import_module("outer_part").whole(1))
     assert results == [4, 12]
+
+
+def test_what_is_kept_of_a_class_that_moved_is_compiled_anew(tmp_path, monkeypatch):
+    monkeypatch.setattr("numba.core.config.CACHE_DIR", str(tmp_path / "kept"))
+    monkeypatch.syspath_prepend(str(tmp_path))
+    pair = "from typing import NamedTuple\nclass Pair(NamedTuple):\n    a: float\n    b: float\n"
+    total = "from gfimu.base.compiled import compiled\n@compiled\ndef total(pair):\n    return pair.a + pair.b\n"
+    (tmp_path / "adder.py").write_text(f"{pair}{total}")
+    assert importlib.import_module("adder").total(importlib.import_module("adder").Pair(1.0, 2.0)) == 3.0
+    (tmp_path / "pairs.py").write_text(pair)
+    (tmp_path / "adder.py").write_text(total)
+    sys.modules.pop("adder")
+    importlib.invalidate_caches()
+    assert importlib.import_module("adder").total(importlib.import_module("pairs").Pair(1.0, 2.0)) == 3.0
