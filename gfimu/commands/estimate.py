@@ -3,6 +3,8 @@ r"""Estimate p, α, ω, attitude and table angle from a recording.
 Examples
 --------
 gfimu estimate run.parquet --method filter --rest-bias --out estimate.parquet
+# Everything that a table shows, in one adjustment
+gfimu estimate run.parquet --method batch --use tacho --use axis --out estimate.parquet
 # One chip on a table
 gfimu estimate run.csv --array arm.toml --axis z --out estimate.csv
 # Two chips on a wheel
@@ -12,7 +14,7 @@ gfimu estimate run.csv --array arm.toml --axis z --lever-std-m 0.003 --rotation-
     --bias-std-m-s2 0.3 --out est.csv
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
@@ -34,8 +36,15 @@ if TYPE_CHECKING:
 
 __all__ = ["Place", "estimate"]
 
-_FILTERED = " (filter, smoother)"
+_FILTERED = " (filter, smoother, batch)"
 _METHOD = Option(f"Angular rate by: {', '.join(RATE_METHODS)}.", "METHOD", offers=tuple(RATE_METHODS))
+_REFERENCES = ("gyro", "tacho", "angle", "position", "axis")
+_USE = Option(
+    "What to use beside the readings (filter, smoother, batch): gyro, tacho, angle (encoder), position (columns "
+    "position_x_m …), axis (the body turns about the table's axis only); repeat it.",
+    "REFERENCE",
+    offers=_REFERENCES,
+)
 _FORMS = ("auto", "linear", "joint", "recursive")
 _FORM = Option("How readings turn into p and α: auto, linear, joint or recursive.", "FORM", offers=_FORMS)
 _OMEGA = Option("Angular rate at the first sample (3,), body axes, rad/s, where it is known.", shell=False)
@@ -134,6 +143,7 @@ def estimate(
     calibration: given.CalibrationToApply = None,
     start: Annotated[str, options.START] = "any",
     gyro: Annotated[bool, options.GYRO.also(_FILTERED)] = False,
+    use: Annotated[Sequence[str], _USE] = (),
     position: Annotated[bool, Option("Integrate to velocity and position too.")] = False,
     place: Annotated[Place, _PLACE] = Place(),
     force: Annotated[bool, options.FORCE] = False,
@@ -198,7 +208,7 @@ def estimate(
                 quaternion0=quaternion0,
                 noise_std=noise_std,
                 with_position=position,
-                fuse_gyro=gyro,
+                use=(*use, *(["gyro"] if gyro else [])),
                 force=force,
                 keep_faulty=keep_faulty,
                 progress=progress,
@@ -207,7 +217,7 @@ def estimate(
     else:
         from gfimu.motion.axis_estimation import estimate_about_axis  # not for those without an axis: scipy.optimize
 
-        useless = {"--latitude": place.latitude is not None, "--gyro": gyro, "--position": position}
+        useless = {"--latitude": place.latitude is not None, "--gyro": gyro, "--use": bool(use), "--position": position}
         for option, given_too in {**useless, "--keep-faulty": keep_faulty}.items():
             if given_too:
                 raise InputError(f"{option} has no use with --axis: the rate about one axis is all that is estimated")

@@ -92,6 +92,7 @@ def live(
     from gfimu.commands.opened import as_array
     from gfimu.rate.health.live.watched_filter import WatchedRateFilter
     from gfimu.rate.live import LiveRateFilter
+    from gfimu.rate.references import Reference
     from gfimu.rate.sensing import SensorErrors
     from gfimu.rate.settings import FilterSettings
     from gfimu.rate.stream import examined_lines, filter_stream, read_head
@@ -125,6 +126,8 @@ def live(
     watched = None
     if not keep_faulty:
         is_sure = scale_std > 0.0 or "calibration" in metadata
-        live = LiveRateFilter(geometry, errors, 1.0 / rate, settings, gyro=gyro)
+        live = LiveRateFilter(
+            geometry, errors, 1.0 / rate, settings, references=[Reference.gyro(errors)] if gyro else []
+        )
         watched = WatchedRateFilter.of(live, errors, calibrated=is_sure)
     return filter_stream(lines, geometry, errors, 1.0 / rate, settings, fuse_gyro=gyro, watched=watched)

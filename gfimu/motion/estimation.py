@@ -26,6 +26,7 @@ from gfimu.motion.channel_health import UsedReadings, watched_readings
 from gfimu.motion.earth import EarthRotation
 from gfimu.motion.estimate import FORMAT_VERSION, Estimate
 from gfimu.motion.navigation import level, navigate
+from gfimu.motion.references import references_of
 from gfimu.rate.path_start import PathStart
 from gfimu.rate.problem import RateProblem, RateSolution
 from gfimu.rate.registry import rate_method
@@ -39,7 +40,6 @@ from gfimu.recording.clipping import without_clipped
 
 __all__ = ["Estimate", "estimate"]
 
-_AXES = ("x", "y", "z")
 _LEVEL_SECONDS = 1.0
 
 
@@ -56,7 +56,7 @@ def estimate(
     with_position: bool = False,
     earth: EarthRotation | None = None,
     gravity: float = STANDARD_GRAVITY,
-    fuse_gyro: bool = False,
+    use: Sequence[str] = (),
     force: bool = False,
     keep_faulty: bool = False,
     findings: Sequence[Finding] | None = None,
@@ -91,23 +91,24 @@ def estimate(
         position are those in the world that turns. ω stays what the array measures, the rate against the stars.
     gravity : float
         Local gravity for the position, m/s².
-    fuse_gyro : bool
-        Whether ``filter`` and ``smoother`` use the recording's gyro as well.
+    use : sequence of str
+        References of the recording that a recursive method uses as well, of
+        `gfimu.motion.references.REFERENCE_NAMES`.
     force : bool
         Whether to go on with a recording that its checks refuse; what they found is kept as a warning.
     keep_faulty : bool
-        Use every channel, without looking for faulty ones. By default ``filter`` and ``smoother`` leave out channels
+        Use every channel, without looking for faulty ones. By default recursive methods leave out channels
         that contradict the others, while they do so (`gfimu.rate.health`): from the first sample after a rest, else
         from when the rate has settled.
     findings : sequence of Finding, optional
         What `gfimu.recording.checks.check_recording` found, if it was run already.
     progress : callable, optional
-        Called with the share of the work that ``filter`` and ``smoother`` have done so far, 0 to 1.
+        Called with the share of the work that recursive methods have done so far, 0 to 1.
 
     Returns
     -------
     Estimate
-        Its metadata hold ``warnings`` and, with ``filter`` and ``smoother``, ``consistency``
+        Its metadata hold ``warnings`` and, with recursive methods, ``consistency``
         (`gfimu.rate.consistency.Consistency`).
 
     Raises
@@ -127,8 +128,8 @@ def estimate(
     readings = recording.for_array(array)
     saturated = np.isnan(readings) & ~missing
     rate0 = None if omega0 is None else np.asarray(omega0, dtype=float)
-    if fuse_gyro:
-        chosen.refuse_gyro()
+    for name in use:
+        chosen.refuse_references(name)
     if keep_faulty:
         chosen.refuse_keep_faulty()
     if rate0 is not None and (rate0.shape != (3,) or not np.isfinite(rate0).all()):
@@ -147,15 +148,15 @@ def estimate(
     if not usable.any():
         raise InputError("no sample has enough channels for p and alpha; check the recording for missing readings")
 
-    gyro = _gyro(recording) if fuse_gyro else None
     temperature = recording.reference.get("temperature_degC")
     errors = SensorErrors.of_recording(
         array, recording.metadata, recording.sample_rate, step=step_of_readings(readings), noise_std=noise,
     )  # fmt: skip
+    references = references_of(recording, use, _table_axis(recording), errors)
     path_start = _path_start(recording, quaternion0, gravity, earth, level=levelled)
     problem = RateProblem(
         array, recording.t_s, readings, errors, calibrated_bias_std(recording.metadata, array) is not None,
-        linear, rate0, gyro, temperature, path_start, levelled, progress,
+        linear, rate0, references, temperature, path_start, levelled, progress,
     )  # fmt: skip
     dead = [name for finding in found if finding.kind == "dead" for name in finding.channels]
     at_rest = chosen.open_loop if rate0 is None else not rate0.any()
@@ -256,15 +257,6 @@ def _integrated(
         "velocity": travelled.velocity,
         "position": travelled.position,
     }
-
-
-def _gyro(recording: Recording) -> NDArray[np.float64]:
-    """Return the recording's gyro, shape (n, 3), rad/s."""
-    names = [f"gyro_{axis}_rad_s" for axis in _AXES]
-    missing = [name for name in names if name not in recording.reference]
-    if missing:
-        raise InputError(f"the recording has no {', '.join(missing)}; record a gyro, or estimate without one")
-    return np.column_stack([recording.reference[name] for name in names])
 
 
 def _initial_attitude(

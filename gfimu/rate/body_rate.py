@@ -1,7 +1,8 @@
 """The state model of a body's rate over the kernel, compiled: one sample after the other.
 
-State x = [ω (3); ε (3); path (0 or 10); b_α (3); b_z (m); b_p (0 or 3); b_gyro (0 or 3); φ (q)]: the path is that of
+State x = [ω (3); ε (3); path (0 or 10); b_α (3); b_z (m); b_p (0 or 3); ρ (e); φ (q)]: the path is that of
 `gfimu.rate.path`, behind it stand constants, of which the errors φ of the channels may be considered and not estimated.
+ρ are the errors of references.
 From sample k − 1 to k, Δt later,
 
     ω ← ω + ∫α + ½ Δt (ε_{k−1} + ε_k) − Δt b_α − ½ Δt (L s(ω))_{k−1, k} − Δt (K b_z) − ∫A D φ − γ Δt S r      (1)
@@ -37,6 +38,7 @@ from numpy.typing import NDArray
 from gfimu.base.compiled import INNER, compiled
 from gfimu.rate.filter_state import (
     COMPLETE,
+    CONSTANT,
     EXCESS,
     FIFTH,
     FOURTH,
@@ -49,6 +51,7 @@ from gfimu.rate.filter_state import (
     MISFIT,
     PARITY,
     POWER,
+    RATE,
     RESTING,
     ROUGH,
     SOLVED,
@@ -116,7 +119,7 @@ def follow(samples, given, first, last, tables, tuning, carried, out, offset, re
     again = len(given.level) > 0
     x, p = carried.x, carried.covariance
     n, m = len(x), samples.z.shape[1]
-    r, gyro_at = tuning.at.alpha, tuning.at.gyro
+    r = tuning.at.alpha
     counts, scalars = carried.counts, carried.scalars
     keep, follows_path = len(record.used) > 0, tuning.at.alpha > TILT
     transition = np.zeros((r, n))
@@ -163,17 +166,8 @@ def follow(samples, given, first, last, tables, tuning, carried, out, offset, re
             nis, stated, inflation = _take_products(
                 samples, given, k, tables, tuning, carried, inflation, slopes, gain, record, row, place_of
             )
-        for a in range(tuning.at.errors - gyro_at):
-            if not np.isnan(samples.gyro[k, a]):
-                innovation = samples.gyro[k, a] - x[a] - x[gyro_at + a]
-                unit[a] = unit[gyro_at + a] = 1.0
-                square = innovation**2 * take(
-                    x, p, unit, innovation, tuning.gyro_variance, counts[SOLVED], gain, record, row
-                )
-                nis += square
-                stated += square
-                unit[a] = unit[gyro_at + a] = 0.0
-                dof += 1
+        square, count = _take_references(samples, given, k, tuning, carried, unit, gain, record, row)
+        nis, stated, dof = nis + square, stated + square, dof + count
         if place >= 0:
             counts[SUMMED] += 1
             for a in range(3):
@@ -354,7 +348,7 @@ def _correct_alpha(samples, given, k, tables, tuning, carried, level, renewed, t
     place = samples.channel_set[k]
     half = 0.5 * (samples.t[k] - carried.scalars[TIME])
     square = ahead[0] * ahead[0] + ahead[1] * ahead[1] + ahead[2] * ahead[2]
-    turn = 4.0 * half / _STABLE
+    turn = 0.0 if len(given.level) > 0 else 4.0 * half / _STABLE
     share = 1.0 / ((1.0 + turn * turn * tables.cross_size[place] * square) * level * level)
     weight = half * share
     for a in range(3):
@@ -510,6 +504,40 @@ def _take_products(samples, given, k, tables, tuning, carried, level, slopes, ga
     if follows:
         scalars[LAGGED] += tuning.forget_second * (lagged / count - scalars[LAGGED])
     return nis, by_stated, level
+
+
+@njit(**INNER)
+def _take_references(samples, given, k, tuning, carried, unit, gain, record, row):  # type: ignore[no-untyped-def]
+    """Measure what the references of sample k show; returns innovations² over their variance, and how many there are.
+
+    ``unit`` (n,) is zero, and left so.
+    """
+    x, rows, path = carried.x, tuning.references, tuning.path
+    about = given.omega[k] if len(given.level) > 0 else x[:3]
+    nis, count, rate, change = 0.0, 0, 0.0, 0.0
+    for a in range(3):
+        rate += path.axis[a] * about[a]
+        change += path.axis[a] * samples.alpha[k, a]
+    for i in range(len(rows.variance)):
+        if np.isnan(samples.references[k, i]):
+            continue
+        for a in range(3):
+            unit[rows.first[i] + a] = rows.weights[i, a]
+        for j in range(len(rows.value_of)):
+            if rows.value_of[j] == i:
+                kind = rows.grows_with[j]
+                unit[tuning.at.references + j] = 1.0 if kind == CONSTANT else (rate if kind == RATE else change)
+        innovation = samples.references[k, i]
+        for j in range(len(x)):
+            innovation -= unit[j] * x[j]
+        solved = carried.counts[SOLVED]
+        inverse = take(x, carried.covariance, unit, innovation, rows.variance[i], solved, gain, record, row)
+        nis += innovation * innovation * inverse
+        if tuning.compares:
+            carried.scalars[LIKELIHOOD] -= 0.5 * (innovation * innovation * inverse - np.log(inverse))
+        count += 1
+        unit[:] = 0.0
+    return nis, count
 
 
 @njit(**INNER)

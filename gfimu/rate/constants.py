@@ -24,12 +24,12 @@ class Constants(NamedTuple):
     @classmethod
     def of_state(cls, carried: Carried, at: Places) -> Self:
         """Return those in the state of a filter."""
-        places = np.r_[at.alpha : at.gyro, at.errors : at.end]
+        places = np.r_[at.alpha : at.references, at.errors : at.end]
         return cls(carried.x[places], carried.covariance[np.ix_(places, places)])
 
     def put(self, carried: Carried, at: Places) -> None:
         """Put them into the state of a filter."""
-        places = np.r_[at.alpha : at.gyro, at.errors : at.end]
+        places = np.r_[at.alpha : at.references, at.errors : at.end]
         carried.x[places], carried.covariance[np.ix_(places, places)] = self
 
     def of_alpha(self, samples: Samples) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

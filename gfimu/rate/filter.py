@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,12 +13,13 @@ from gfimu.base.errors import GeometryError, InputError
 from gfimu.rate.filter_state import LIKELIHOOD, Estimates
 from gfimu.rate.live import LiveRateFilter
 from gfimu.rate.path_start import PathStart
+from gfimu.rate.references import Measured
 from gfimu.rate.result import DECIDED, RateEstimate, SignDecision, clear_of_zero
 from gfimu.rate.sensing import SensorErrors
 from gfimu.rate.settings import FilterSettings
 from gfimu.rate.signs import DISAGREEING, DISAGREES_OFTEN, SignJudge, likelier, merged, with_filter, with_signs
 
-__all__ = ["filter_rate", "increasing_times", "smooth_rate"]
+__all__ = ["adjust_rate", "filter_rate", "increasing_times", "smooth_rate"]
 
 _PREFERRED = 1.0  # samples' worth of decided signs from which the single samples choose between two rates
 
@@ -30,7 +31,7 @@ def filter_rate(
     errors: SensorErrors,
     settings: FilterSettings | None = None,
     *,
-    gyro: ArrayLike | None = None,
+    references: Sequence[Measured] = (),
     path: PathStart | None = None,
     progress: Callable[[float], object] | None = None,
 ) -> RateEstimate:
@@ -50,8 +51,8 @@ def filter_rate(
         Errors of the sensors.
     settings : FilterSettings, optional
         Start, quadrature, rest.
-    gyro : array_like, shape (n, 3), optional
-        Gyro to fuse, rad/s; NaN where saturated.
+    references : sequence of Measured, optional
+        What was measured beside the readings, such as `Reference.gyro`.
     path : PathStart, optional
         Where attitude, velocity and position start, if they are asked for.
     progress : callable, optional
@@ -64,7 +65,7 @@ def filter_rate(
     GeometryError
         If the array can't see all six motions.
     """
-    return _solve("filter", array, t, readings, errors, settings, gyro, path, progress, smooth=False)
+    return _solve("filter", array, t, readings, errors, settings, references, path, progress, smooth=False)
 
 
 def smooth_rate(
@@ -74,7 +75,7 @@ def smooth_rate(
     errors: SensorErrors,
     settings: FilterSettings | None = None,
     *,
-    gyro: ArrayLike | None = None,
+    references: Sequence[Measured] = (),
     path: PathStart | None = None,
     progress: Callable[[float], object] | None = None,
 ) -> RateEstimate:
@@ -82,7 +83,28 @@ def smooth_rate(
 
     ``nis`` are those of the filter.
     """
-    return _solve("smoother", array, t, readings, errors, settings, gyro, path, progress, smooth=True)
+    return _solve("smoother", array, t, readings, errors, settings, references, path, progress, smooth=True)
+
+
+def adjust_rate(
+    array: AccelerometerArray,
+    t: ArrayLike,
+    readings: ArrayLike,
+    errors: SensorErrors,
+    settings: FilterSettings | None = None,
+    *,
+    references: Sequence[Measured] = (),
+    path: PathStart | None = None,
+    progress: Callable[[float], object] | None = None,
+) -> RateEstimate:
+    """Adjust a recording: the most probable run by all samples and references; arguments are those of `filter_rate`.
+
+    Each pass smooths about the rates of the pass before, until they stay, which is Gauss and Newton's method for the
+    whole run (B. M. Bell, SIAM J. Optim. 4, 1994). ``nis`` are those of the filter.
+    """
+    return _solve(
+        "batch", array, t, readings, errors, settings, references, path, progress, smooth=True, until_stays=True
+    )
 
 
 def increasing_times(t: ArrayLike, needed_by: str) -> tuple[NDArray[np.float64], float]:
@@ -108,15 +130,19 @@ def _solve(
     readings: ArrayLike,
     errors: SensorErrors,
     settings: FilterSettings | None,
-    gyro: ArrayLike | None,
+    references: Sequence[Measured],
     path: PathStart | None,
     progress: Callable[[float], object] | None,
     *,
     smooth: bool,
+    until_stays: bool = False,
 ) -> RateEstimate:
     times, period = increasing_times(t, f"the {method}")
-    live = LiveRateFilter(array, errors, period, settings, gyro=gyro is not None, path=path, progress=progress)
-    tracks = live.run_recording(times, readings, gyro, smooth=smooth)
+    live = LiveRateFilter(
+        array, errors, period, settings, references=[one.reference for one in references], path=path, progress=progress
+    )
+    beside = np.concatenate([np.zeros((len(times), 0)), *(one.values for one in references)], axis=1)
+    tracks = live.run_recording(times, readings, beside, smooth=smooth, until_stays=until_stays)
     assert live.start is not None
     found = [live.estimate_of(times, out, method, index) for index, out in enumerate(tracks)]
     for one in found:
@@ -129,7 +155,10 @@ def _signed(live: LiveRateFilter, tracks: list[Estimates], found: list[RateEstim
     assert live.start is not None
     judge = SignJudge(live.sets, live.start, live.period)
     disagrees = np.mean(tracks[0].inflation > DISAGREEING) >= DISAGREES_OFTEN
-    if live.has_gyro or not judge.possible or not (live.start.sign_open or live.restarts or disagrees):
+    if live.sign_is_measured:
+        best, _ = likelier(*live.carried) if len(found) > 1 else (0, 1.0)
+        return replace(found[best], sign=SignDecision())
+    if not judge.possible or not (live.start.sign_open or live.restarts or disagrees):
         return replace(found[0], sign=SignDecision())
     chances = [
         judge.of_recording(live.samples, live.constants(index), out, one.rest)

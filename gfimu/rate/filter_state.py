@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from gfimu.rate.path import ROWS, TILT, Path, PathTuning
 
 __all__ = [
-    "COMPLETE", "COUNTS", "EXCESS", "FIFTH", "FOURTH", "JUDGED", "LAGGED", "LAST_ALPHA", "LAST_SET", "LEVEL",
-    "LIKELIHOOD", "MISFIT", "PARITY", "POWER", "RESTING", "ROUGH", "SCALARS", "SOLVED", "STARTED", "STILL", "SUMMED",
-    "TIME", "WALK", "WANDER", "Carried", "Estimates", "Given", "Places", "Samples", "SingleRates", "Tuning",
-    "no_rates",
+    "CHANGE", "COMPLETE", "CONSTANT", "COUNTS", "EXCESS", "FIFTH", "FOURTH", "JUDGED", "LAGGED", "LAST_ALPHA",
+    "LAST_SET", "LEVEL", "LIKELIHOOD", "MISFIT", "PARITY", "POWER", "RATE", "RESTING", "ROUGH", "SCALARS", "SOLVED",
+    "STARTED", "STILL", "SUMMED", "TIME", "WALK", "WANDER", "Carried", "Estimates", "Given", "Places",
+    "ReferenceRows", "Samples", "SingleRates", "Tuning", "no_rates",
 ]  # fmt: skip
 
 # Places in Carried.scalars
@@ -24,6 +24,8 @@ TIME, LAST_ALPHA, WALK, FOURTH, FIFTH, PARITY, LEVEL, EXCESS, LAGGED, MISFIT, LI
 WANDER, POWER, SCALARS = range(11, 14)
 # Places in Carried.counts
 STARTED, STILL, JUDGED, LAST_SET, ROUGH, SUMMED, COMPLETE, RESTING, SOLVED, COUNTS = range(10)
+# What an error of a reference is multiplied by: nothing, the rate about the path's axis, or its change
+CONSTANT, RATE, CHANGE = range(3)
 
 
 class Places(NamedTuple):
@@ -32,18 +34,28 @@ class Places(NamedTuple):
     alpha: int  # of b_α, the first constant
     products: int  # of b_z
     force: int  # of b_p
-    gyro: int  # of the biases of a gyro
+    references: int  # of the first error of a reference
     errors: int  # of the first error of a channel
     end: int
 
     @classmethod
-    def of(cls, products: int, errors: int, *, path: bool, gyro: bool) -> Places:
-        """Return the places for so many rows of the null space and errors of the channels."""
+    def of(cls, products: int, errors: int, *, path: bool, references: int = 0) -> Places:
+        """Return the places for so many rows of the null space and errors of channels and references."""
         alpha = TILT + (ROWS if path else 0)
         force = alpha + 3 + products
-        gyro_at = force + (3 if path else 0)
-        errors_at = gyro_at + (3 if gyro else 0)
-        return cls(alpha, alpha + 3, force, gyro_at, errors_at, errors_at + errors)
+        references_at = force + (3 if path else 0)
+        errors_at = references_at + references
+        return cls(alpha, alpha + 3, force, references_at, errors_at, errors_at + errors)
+
+
+class ReferenceRows(NamedTuple):
+    """Values beside the readings, each weights · x[first : first + 3] + its errors + noise; f values, e errors."""
+
+    first: NDArray[np.int64]  # (f,) component of the state
+    weights: NDArray[np.float64]  # (f, 3)
+    variance: NDArray[np.float64]  # (f,)
+    value_of: NDArray[np.int64]  # (e,) value that an error is of
+    grows_with: NDArray[np.int64]  # (e,) what it is multiplied by: CONSTANT, RATE or CHANGE
 
 
 class Tuning(NamedTuple):
@@ -51,7 +63,6 @@ class Tuning(NamedTuple):
 
     period: float  # nominal sample period, s
     overshoot: float  # g of (1)
-    gyro_variance: float  # (rad/s)²
     rest_variance: float  # of the rate at rest, (rad/s)²
     rest_limit: float  # χ² of ω up to which a rest goes on
     entry_rate: float  # χ² of ω up to which one begins
@@ -74,6 +85,7 @@ class Tuning(NamedTuple):
     open_loop: bool  # whether α is integrated without measurements of the rate
     compares: bool  # whether the likelihood of two mirrored rates is to be compared
     path: PathTuning
+    references: ReferenceRows
 
 
 class Carried(NamedTuple):
@@ -134,7 +146,7 @@ class Samples(NamedTuple):
     differences: NDArray[np.float64]  # (N, 2) squares of the fourth and fifth difference of α
     channel_set: NDArray[np.int64]  # (N,) −1: α is not seen
     parity: NDArray[np.float64]  # (N,) χ² of the parity rows per degree of freedom; NaN where there are none
-    gyro: NDArray[np.float64]  # (N, 3), NaN where there is none
+    references: NDArray[np.float64]  # (N, f) values beside the readings, NaN where there is none
     still: NDArray[np.int64]  # (N,) verdict on the block that ends here (`gfimu.rate.rest_test`), 0 where none does
     model_error: NDArray[np.float64]  # (N,) variance by errors of the sampling times over that of the noise
     features: NDArray[np.float64]  # (N, 12) of the motion, by this sample; (N, 0) where no errors are considered

@@ -6,7 +6,7 @@ is. A start that moves has two mirrored rates, which read the same: both are fol
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
@@ -42,6 +42,7 @@ from gfimu.rate.measured_noise import measured_noise, timing_noise
 from gfimu.rate.path import ROWS, TILT, rest_on_path
 from gfimu.rate.path_start import PathStart, levelled, settled, with_attitude
 from gfimu.rate.reduction import Reduction
+from gfimu.rate.references import Reference, rows_of
 from gfimu.rate.rest_test import DOUBTED, MOVES, RESTS, RestJudge, RestTest, still_blocks
 from gfimu.rate.result import (
     DECIDED,
@@ -81,8 +82,8 @@ class LiveRateFilter:
         Nominal sample period, s.
     settings : FilterSettings, optional
         Start, quadrature, rest, noise.
-    gyro : bool
-        Whether gyro readings come along.
+    references : sequence of Reference
+        What is measured beside the readings.
     open_loop : bool
         Whether α is integrated, with the biases of a first rest, and the rate is measured nowhere else.
     path : PathStart, optional
@@ -109,7 +110,7 @@ class LiveRateFilter:
         period: float,
         settings: FilterSettings | None = None,
         *,
-        gyro: bool = False,
+        references: Sequence[Reference] = (),
         open_loop: bool = False,
         path: PathStart | None = None,
         progress: Callable[[float], object] | None = None,
@@ -121,7 +122,11 @@ class LiveRateFilter:
         self._ahead = stencil.points - 2 + stencil.before[0]
         self._test = self.settings.rest or RestTest()
         self._window = self._test.window(period)
-        self.has_gyro, self._open_loop, self._path, self._progress = gyro, open_loop, path, progress
+        self._references, self._reference_std = rows_of(references)
+        of_rate = self._references.weights[self._references.first < TILT]
+        self.sign_is_measured = len(of_rate) > 0
+        self._rate_is_measured = bool(np.linalg.matrix_rank(of_rate) == 3)
+        self._open_loop, self._path, self._progress = open_loop, path, progress
         self._waiting: list[tuple[NDArray[np.float64], ...]] = []
         self._last_time = -np.inf
         self._received = 0
@@ -129,7 +134,7 @@ class LiveRateFilter:
         self.carried: list[Carried] = []
         self._stated_errors = ChannelErrors.stated(array, errors)
         self._reduction = Reduction(self.sets, errors, period)
-        self._samples = self._reduction.none()
+        self._samples = self._reduction.none(len(self._references.variance))
         self._raw = np.zeros((0, array.n_channels))
         self._base = self._done = 0  # number in the stream of buffer row 0; buffer row to filter next
         self._resumed = 0  # buffer row to filter next, behind a first block that rests
@@ -153,7 +158,7 @@ class LiveRateFilter:
         """What was wrong with the channels so far."""
         return replace(self._reduction.report(), restarts=self.restarts)
 
-    def push(self, t: ArrayLike, readings: ArrayLike, gyro: ArrayLike | None = None) -> RateEstimate:
+    def push(self, t: ArrayLike, readings: ArrayLike, references: ArrayLike | None = None) -> RateEstimate:
         """Take one sample or a block; returns the estimates that are ready.
 
         Parameters
@@ -162,8 +167,8 @@ class LiveRateFilter:
             Sample times, s, later than all before.
         readings : array_like, shape (c,) or (n, c)
             Specific force, m/s²; NaN where a channel is missing.
-        gyro : array_like, shape (3,) or (n, 3), optional
-            Gyro, rad/s; NaN where saturated.
+        references : array_like, shape (f,) or (n, f), optional
+            Values of all references, in their order, as of a gyro (3,), rad/s; NaN where there is none.
 
         Raises
         ------
@@ -172,14 +177,14 @@ class LiveRateFilter:
         """
         if self._path is not None:
             raise InputError("a stream has no path: give the whole recording to filter_rate")
-        times, rows, turning = self._checked(t, readings, gyro)
+        times, rows, beside = self._checked(t, readings, references)
         found = []
         # The last sample of each block of the rest test by itself, so that the answer is that of single samples.
         to_end = self._window - self._received % self._window
         ends = range(to_end, len(times) + 1, self._window)
         edges = sorted({0, len(times), *ends, *(end - 1 for end in ends)})
         for first, last in pairwise(edges):
-            self._waiting.append((times[first:last], rows[first:last], turning[first:last]))
+            self._waiting.append((times[first:last], rows[first:last], beside[first:last]))
             self._received += last - first
             if not self.started and self._received >= self._window + self._ahead:
                 self._begin(self._window)
@@ -196,12 +201,12 @@ class LiveRateFilter:
         return self._estimate(*self._advance(closing=True))
 
     def _nothing(self) -> tuple[Samples, list[Estimates]]:
-        return self._reduction.none(), [Estimates.empty(0)]
+        return self._reduction.none(len(self._references.variance)), [Estimates.empty(0)]
 
     def _checked(
-        self, t: ArrayLike, readings: ArrayLike, gyro: ArrayLike | None
+        self, t: ArrayLike, readings: ArrayLike, references: ArrayLike | None
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Return samples as arrays (n,), (n, c) and (n, 3)."""
+        """Return samples as arrays (n,), (n, c) and (n, f)."""
         times = np.atleast_1d(np.asarray(t, dtype=float))
         rows = np.atleast_2d(np.asarray(readings, dtype=float))
         if rows.shape != (len(times), self.array.n_channels):
@@ -213,18 +218,19 @@ class LiveRateFilter:
             np.isfinite(times).all() and times[0] > self._last_time and np.all(times[1:] > times[:-1])
         ):
             raise InputError("sample times must be finite and increase; drop repeated or reordered samples")
-        turning = np.full((len(times), 3), np.nan)
-        if gyro is not None:
-            turning = np.atleast_2d(np.asarray(gyro, dtype=float))
-            if turning.shape != (len(times), 3):
-                raise InputError(f"gyro has shape {turning.shape}; {len(times)} times need ({len(times)}, 3)")
+        shape = (len(times), len(self._references.variance))
+        beside = np.full(shape, np.nan)
+        if references is not None:
+            beside = np.atleast_2d(np.asarray(references, dtype=float))
+            if beside.shape != shape:
+                raise InputError(f"references have shape {beside.shape}; {len(times)} times need {shape}")
         if len(times):
             self._last_time = float(times[-1])
-        return times, rows, turning
+        return times, rows, beside
 
-    def _take_recording(self, t: ArrayLike, readings: ArrayLike, gyro: ArrayLike | None) -> None:
+    def _take_recording(self, t: ArrayLike, readings: ArrayLike, references: ArrayLike | None = None) -> None:
         """Take a whole recording, begin and reduce it."""
-        self._waiting = [self._checked(t, readings, gyro)]
+        self._waiting = [self._checked(t, readings, references)]
         self._begin(len(self._waiting[0][0]), whole=True)
 
     def _begin(self, known: int, *, whole: bool = False) -> None:
@@ -244,12 +250,13 @@ class LiveRateFilter:
         prior = sets.bias_covariance(np.diag(self.errors.bias_std**2), path=self._path is not None)
         self.start = start = self._inferred(complete, prior, still=still)
         prior = start.bias_factor * prior
-        at = Places.of(m, q, path=self._path is not None, gyro=self.has_gyro)
+        at = Places.of(m, q, path=self._path is not None, references=len(self._reference_std))
         self.tuning: Tuning = tuning_of(
             sets, self.errors, self.period, self.settings, at=at, compares=start.sign_open and not self._open_loop,
             open_loop=self._open_loop,
-            solved_in_motion=at.end if self.has_gyro else at.products,
+            solved_in_motion=at.end if self._rate_is_measured else at.products,
             path=(self._path or PathStart()).tuning(self._window),
+            references=self._references,
         )  # fmt: skip
         self._judge = RestJudge(sets.full.alpha_noise / self._window, self._test)
         self._signs = SignJudge(sets, start, self.period)
@@ -290,12 +297,12 @@ class LiveRateFilter:
     def _covariance_before(self, biases: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the covariance of the state before the run, but for the rate, (n, n)."""
         at = self.tuning.at
-        gyro, errors = range(at.gyro, at.errors), range(at.errors, at.end)
+        references, errors = range(at.references, at.errors), range(at.errors, at.end)
         before = np.zeros((at.end, at.end))
         settled = (1.0 + self.tuning.overshoot) / (1.0 - self.tuning.overshoot)
         before[3:6, 3:6] = settled * self.sets.full.alpha_noise
-        before[at.alpha : at.gyro, at.alpha : at.gyro] = biases
-        before[gyro, gyro] = self.errors.gyro_bias_std**2
+        before[at.alpha : at.references, at.alpha : at.references] = biases
+        before[references, references] = self._reference_std**2
         before[errors, errors] = 1.0
         return before
 
@@ -345,9 +352,9 @@ class LiveRateFilter:
     def _prepare(self, *, closing: bool) -> int:
         """Reduce the samples that wait and judge them for rest; returns the row up to which they can be filtered."""
         if self._waiting:
-            t, rows, gyro = (np.concatenate(column) for column in zip(*self._waiting, strict=True))
+            t, rows, beside = (np.concatenate(column) for column in zip(*self._waiting, strict=True))
             self._waiting = []
-            new = self._reduction.reduce(self._raw, self._samples, t, rows, gyro)
+            new = self._reduction.reduce(self._raw, self._samples, t, rows, beside)
             self._samples = Samples._make(
                 np.concatenate([old, added]) for old, added in zip(self._samples, new, strict=True)
             )
@@ -368,7 +375,7 @@ class LiveRateFilter:
     def _record(self, length: int) -> Record:
         m = self.sets.products
         at = self.tuning.at
-        return Record.empty(length, at.alpha, at.end, m + 15 + 3 * self.has_gyro)
+        return Record.empty(length, at.alpha, at.end, m + 15 + len(self._references.variance))
 
     def _judge_blocks(self, *, closing: bool) -> None:
         """Mark the blocks that are decided to be rest or not; filter again from the end of one that is decided anew."""
@@ -414,13 +421,21 @@ class LiveRateFilter:
         return self._samples
 
     def run_recording(
-        self, t: ArrayLike, readings: ArrayLike, gyro: ArrayLike | None = None, *, smooth: bool
+        self,
+        t: ArrayLike,
+        readings: ArrayLike,
+        references: ArrayLike | None = None,
+        *,
+        smooth: bool,
+        until_stays: bool = False,
     ) -> list[Estimates]:
         """Filter a whole recording at once, and smooth it if asked; returns the estimates of each rate followed.
 
+        ``until_stays``: the smoother is repeated about its last rates until they stay, whatever the run.
+
         The statistics of the innovations are those of the filter.
         """
-        self._take_recording(t, readings, gyro)
+        self._take_recording(t, readings, references)
         until = self._prepare(closing=True)
         outputs = []
         for index, carried in enumerate(self.carried):
@@ -431,7 +446,7 @@ class LiveRateFilter:
             report = partial(self._report_progress, index)
             kept = self._forward(carried, Given.nothing(), out, report)
             if smooth:
-                end = self._smooth(start, carried, kept, out, report)
+                end = self._smooth(start, carried, kept, out, report, until_stays=until_stays)
                 if self._path is not None and until > self._resumed:
                     path = out.path
                     self._rest_path(end, out, path.attitude[self._resumed], path.variance[self._resumed])
@@ -502,17 +517,19 @@ class LiveRateFilter:
         kept: list[tuple[int, int, Carried]],
         out: Estimates,
         report: Callable[[float], object],
+        *,
+        until_stays: bool,
     ) -> Carried:
         """Replace estimates of a filter by smoothed ones; returns the last state.
 
-        Where the errors of the null space were not estimated from the first sample on, everything is linearised about
-        the last rates and estimated anew, until the rates stay: Gauss and Newton's method for the whole run (B. M.
-        Bell, The iterated Kalman smoother as a Gauss-Newton method, SIAM J. Optim. 4, 1994).
+        If asked, or where the errors of the null space were not estimated from the first sample on, everything is
+        linearised about the last rates and estimated anew, until the rates stay: Gauss and Newton's method for the
+        whole run (B. M. Bell, The iterated Kalman smoother as a Gauss-Newton method, SIAM J. Optim. 4, 1994).
         """
         solved = start.counts[SOLVED] == len(start.x) and not out.restart.any()
         if solved:
             self._backward(end, kept, Given.nothing(), out, report)
-            if self._path is None or not out.rest[self._resumed :].any():
+            if not until_stays and (self._path is None or not out.rest[self._resumed :].any()):
                 return end
         start.counts[SOLVED] = len(start.x)
         for _ in range(_PASSES):
@@ -576,11 +593,11 @@ class LiveRateFilter:
 
     def leading_rest(self, t: ArrayLike, readings: ArrayLike) -> tuple[Constants, NDArray[np.bool_]]:
         """Reduce a whole recording; returns the constants by the rest at its start, if any, and the samples of it."""
-        self._take_recording(t, readings, None)
+        self._take_recording(t, readings)
         self._prepare(closing=True)
         window, at = self._window, self.tuning.at
         rest = np.zeros(len(self._samples.t), dtype=np.bool_)
-        prior = self.carried[0].prior[at.alpha : at.gyro, at.alpha : at.gyro]
+        prior = self.carried[0].prior[at.alpha : at.references, at.alpha : at.references]
         if self._resumed:
             verdicts = self._samples.still[2 * window - 1 :: window]
             moves = np.flatnonzero(np.append(verdicts, MOVES) < DOUBTED)[0]
@@ -623,7 +640,7 @@ class LiveRateFilter:
             considered = self._stated_errors.excited(self.sets, moments, self.period, path=self._path is not None)
             self._errors_of_products = considered.covariance_of(self.sets.full.product_rows, moments)
         self._reduction = Reduction(self.sets, self.errors, self.period, considered, self._stated_errors)
-        self._samples = self._reduction.none()
+        self._samples = self._reduction.none(len(self._references.variance))
 
     def _errors_of_mean(self, readings: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return what each considered error makes of the mean of [A y; Z y] over complete readings, (3 + m, q)."""
@@ -670,7 +687,14 @@ class LiveRateFilter:
         for large in out.inflation > DISAGREEING:
             self._disagreeing += (large - self._disagreeing) * self.period / _DOUBT_S
         doubt = self.start.sign_open or self.restarts > 0 or self._disagreeing >= DISAGREES_OFTEN
-        if self.has_gyro or not (self._signs.possible and doubt):
+        if self.sign_is_measured:
+            if len(tracks) > 1:
+                best, sure = likelier(*self.carried)
+                found = self.estimate_of(samples.t, tracks[best], index=best)
+                self._decide(best, sure)
+                return replace(found, sign_probability=np.full(len(found), sure))
+            return replace(found, sign_probability=np.ones(len(found)))
+        if not (self._signs.possible and doubt):
             return replace(found, sign_probability=np.full(len(found), 0.5 if self.start.sign_open else 1.0))
         chance = self._signs.of_stream(samples, self.constants(), out, found.rest)
         if len(tracks) > 1:
@@ -679,14 +703,18 @@ class LiveRateFilter:
             sure = 1.0 if merged(found, other) else sure
             if sure < DECIDED and clear_of_zero(found.omega[-1:], found.std[-1:])[0]:
                 best, sure = int(chance[-1] < 0.5), max(chance[-1], 1.0 - chance[-1])
-            if sure >= DECIDED:
-                self.carried = [self.carried[best]]
-                self._pending = {row: [kept[best]] for row, kept in self._pending.items()}
+            self._decide(best, sure)
         if not self.start.sign_open or len(self.carried) == 1:
             chance = with_filter(chance)
         signed = with_signs(found, chance, known=not self.start.sign_open)
         self._sign = signed.sign
         return signed
+
+    def _decide(self, best: int, sure: float) -> None:
+        """Follow one of two rates alone, where it is sure enough."""
+        if sure >= DECIDED:
+            self.carried = [self.carried[best]]
+            self._pending = {row: [kept[best]] for row, kept in self._pending.items()}
 
     def estimate_of(
         self, t: NDArray[np.float64], out: Estimates, method: str = "filter", index: int = 0

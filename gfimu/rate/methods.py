@@ -7,16 +7,18 @@ method         uses                                        sign of ω           
                                                                                     b t of what bias is left
 ``algebraic``  null space, sample by sample                by α, with probability   σ_α/|ω| × 1.0 … 1.22
 ``ml``         null space, sample by sample                by α, with probability   σ_α/|ω|
-``filter``     α, null space, rest, gyro; samples so far   start, or manoeuvre      σ_α √(Δt/|ω|)
+``filter``     α, null space, rest; samples so far         start, or manoeuvre      σ_α √(Δt/|ω|)
 ``smoother``   the same, all samples                       start, or manoeuvre      σ_α √(Δt/2|ω|)
+``batch``      the same, adjusted until nothing changes    start, or manoeuvre      σ_α √(Δt/2|ω|)
 =============  ==========================================  =======================  ==========================
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from gfimu.array.array import AccelerometerArray
@@ -27,6 +29,7 @@ from gfimu.rate.settings import FilterSettings
 
 if TYPE_CHECKING:
     from gfimu.rate.path_start import PathStart
+    from gfimu.rate.references import Measured
 
 __all__ = ["RATE_METHODS", "estimate_rate"]
 
@@ -40,6 +43,7 @@ def estimate_rate(
     method: str = "filter",
     settings: FilterSettings | None = None,
     gyro: ArrayLike | None = None,
+    references: Sequence[Measured] = (),
     path: PathStart | None = None,
     progress: Callable[[float], object] | None = None,
 ) -> RateEstimate:
@@ -61,16 +65,18 @@ def estimate_rate(
         Start of the run, quadrature, recognition of rest. The per-sample methods and the integration take their
         biases from a leading rest if the start is at rest.
     gyro : array_like, shape (n, 3), optional
-        Gyro that ``filter`` and ``smoother`` fuse, rad/s; NaN where saturated.
+        Gyro that ``filter``, ``smoother`` and ``batch`` fuse, rad/s; NaN where saturated.
+    references : sequence of Measured, optional
+        What else these use beside the readings: a tachometer, positions (`gfimu.rate.references`).
     path : PathStart, optional
         Where attitude, velocity and position start, for a method that follows them (`RateMethod.follows_path`).
     progress : callable, optional
-        Called by ``filter`` and ``smoother`` with the share of the work done so far, 0 to 1.
+        Called by ``filter``, ``smoother`` and ``batch`` with the share of the work done so far, 0 to 1.
 
     Raises
     ------
     InputError
-        If the method is unknown, can't use a gyro or an unknown start, or the data don't fit.
+        If the method is unknown, can't use references, or the data don't fit.
     GeometryError
         If the array can't see what the method needs.
 
@@ -85,8 +91,12 @@ def estimate_rate(
     chosen = rate_method(method)
     start = settings or FilterSettings()
     followed = {"path": path} if chosen.follows_path else {}
-    if chosen.recursive:
-        return chosen.solver(array, t, readings, errors, start, gyro=gyro, progress=progress, **followed)
     if gyro is not None:
-        chosen.refuse_gyro()
+        from gfimu.rate.references import Reference  # compiles with the filter
+
+        references = (*references, Reference.gyro(errors).measured(gyro, len(np.atleast_1d(np.asarray(t)))))
+    if chosen.recursive:
+        return chosen.solver(array, t, readings, errors, start, references=references, progress=progress, **followed)
+    for one in references:
+        chosen.refuse_references(one.reference.name)
     return chosen.solver(array, t, readings, errors, start, **followed)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +18,7 @@ from gfimu.rate.sensing import SensorErrors
 
 if TYPE_CHECKING:
     from gfimu.rate.path_start import PathStart
+    from gfimu.rate.references import Measured
 
 __all__ = ["RateProblem", "RateSolution"]
 
@@ -42,8 +43,8 @@ class RateProblem:
         The part of α and p that is linear in the readings, and what ω adds to it.
     omega0 : ndarray, shape (3,), or None
         Angular rate at the first sample, body axes, rad/s; None if unknown.
-    gyro : ndarray, shape (n, 3), optional
-        Gyro to fuse, rad/s; NaN where it is saturated or missing.
+    references : sequence of Measured
+        What was measured beside the readings.
     temperature : ndarray, shape (n,), optional
         Temperature of the chips, °C.
     path : PathStart, optional
@@ -61,7 +62,7 @@ class RateProblem:
     calibrated: bool
     linear: LinearSolution
     omega0: NDArray[np.float64] | None
-    gyro: NDArray[np.float64] | None = None
+    references: Sequence[Measured] = ()
     temperature: NDArray[np.float64] | None = None
     path: PathStart | None = None
     levelled: bool = False

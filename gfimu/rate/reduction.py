@@ -59,15 +59,15 @@ class Reduction:
         )
         return ChannelReport(missing, saturated, stuck, self._blind, self._gaps)
 
-    def none(self) -> Samples:
-        """Return no samples."""
-        return self._samples(np.zeros(0), np.zeros((0, self.sets.array.n_channels)), np.full((0, 3), np.nan))
+    def none(self, references: int) -> Samples:
+        """Return no samples, with so many references."""
+        return self._samples(np.zeros(0), np.zeros((0, self.sets.array.n_channels)), np.zeros((0, references)))
 
-    def _samples(self, t: NDArray[np.float64], rows: NDArray[np.float64], gyro: NDArray[np.float64]) -> Samples:
+    def _samples(self, t: NDArray[np.float64], rows: NDArray[np.float64], references: NDArray[np.float64]) -> Samples:
         n, m, q = len(t), self.sets.products, len(self.considered)
         return Samples(
             t, np.zeros((n, m)), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3)), np.full((n, 2), np.nan),
-            np.zeros(n, dtype=np.int64), np.full(n, np.nan), gyro, np.zeros(n, dtype=np.int64),
+            np.zeros(n, dtype=np.int64), np.full(n, np.nan), references, np.zeros(n, dtype=np.int64),
             np.zeros(n), np.zeros((n, 12 if q else 0)), *(np.zeros((n, rows, q)) for rows in (3, 3, 3, m)),
         )  # fmt: skip
 
@@ -77,7 +77,7 @@ class Reduction:
         before: Samples,
         t: NDArray[np.float64],
         rows: NDArray[np.float64],
-        gyro: NDArray[np.float64],
+        references: NDArray[np.float64],
     ) -> Samples:
         """Reduce further samples.
 
@@ -87,11 +87,11 @@ class Reduction:
             Readings before, as far as they are kept.
         before : Samples
             The same, reduced.
-        t, rows, gyro : ndarray, shapes (n,), (n, c), (n, 3)
-            Times, s; readings, m/s²; gyro, rad/s.
+        t, rows, references : ndarray, shapes (n,), (n, c), (n, f)
+            Times, s; readings, m/s²; values beside the readings.
         """
         n = len(t)
-        samples = self._samples(t, rows, gyro)
+        samples = self._samples(t, rows, references)
         missing = np.isnan(rows)
         saturated = ~missing & ~(np.abs(rows) < self._errors.limits)
         after = self._errors.stuck_after

@@ -27,12 +27,12 @@ class RateMethod:
         Name for ``--method``, and in the result.
     solver : callable
         Estimates the rate at every sample: called with the array, times (n,) in s, readings (n, c) in m/s²,
-        `gfimu.SensorErrors` and `gfimu.rate.settings.FilterSettings`, a recursive one also with ``gyro`` and
-        ``progress`` by name (`gfimu.estimate_rate`), it returns a `gfimu.RateEstimate`.
+        `gfimu.SensorErrors` and `gfimu.rate.settings.FilterSettings`, a recursive one also with
+        ``references`` and ``progress`` by name (`gfimu.estimate_rate`), it returns a `gfimu.RateEstimate`.
     uses : str
         Part of the readings it uses.
     recursive : bool
-        A Kalman recursion over the samples: it can fuse a gyro, start from an unknown rate, report progress, and its
+        A Kalman recursion over the samples: it can use references, start from an unknown rate, report progress, and its
         innovations are tested for consistency.
     open_loop : bool
         α integrated from a known start: the error of a bias grows with time, and no measurement of ω bounds it.
@@ -50,10 +50,10 @@ class RateMethod:
     uses_later_samples: bool = False
     follows_path: bool = False
 
-    def refuse_gyro(self) -> None:
-        """Raise `InputError` unless the method can fuse a gyro."""
+    def refuse_references(self, name: str) -> None:
+        """Raise `InputError` unless the method can use references, such as the one named."""
         if not self.recursive:
-            raise InputError(f"method {self.name!r} can't use a gyro; use {recursive_methods()}")
+            raise InputError(f"method {self.name!r} can't use {name}; use {recursive_methods()}")
 
     def refuse_keep_faulty(self) -> None:
         """Raise `InputError` unless the method looks for faulty channels, which it may then be asked to keep."""
@@ -71,7 +71,7 @@ _RECORDS = (
     RateMethod(
         "filter",
         solvers.filter_readings,
-        "α, null space, rest, gyro; samples so far",
+        "α, null space, rest, references; samples so far",
         recursive=True,
         follows_path=True,
     ),
@@ -79,6 +79,14 @@ _RECORDS = (
         "smoother",
         solvers.smooth_readings,
         "the same, all samples",
+        recursive=True,
+        uses_later_samples=True,
+        follows_path=True,
+    ),
+    RateMethod(
+        "batch",
+        solvers.adjust_readings,
+        "the same, adjusted until nothing changes",
         recursive=True,
         uses_later_samples=True,
         follows_path=True,
@@ -106,4 +114,5 @@ def rate_method(name: str) -> RateMethod:
 
 def recursive_methods() -> str:
     """Names of the recursive methods, for messages."""
-    return " or ".join(method.name for method in _RECORDS if method.recursive)
+    *others, last = (method.name for method in _RECORDS if method.recursive)
+    return f"{', '.join(others)} or {last}"

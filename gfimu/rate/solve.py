@@ -61,7 +61,7 @@ def _with_sensor_errors(method: RateMethod, problem: RateProblem) -> RateSolutio
     settings = FilterSettings(start_omega=problem.omega0)
     found = estimate_rate(
         problem.array, problem.t_s, problem.readings, errors, method=method.name, settings=settings,
-        gyro=problem.gyro, path=problem.path, progress=problem.progress,
+        references=problem.references, path=problem.path, progress=problem.progress,
     )  # fmt: skip
     disagreement = None if found.scale is None else sum_up_disagreement(found.scale, found.omega)
     start = found.start
@@ -130,9 +130,15 @@ def _filter_again(
         else:
             std = float(np.nan_to_num(found.std[rows.start]).max())
             settings = FilterSettings(found.omega[rows.start], max(std, 1e-3), measure_noise=False)
-        gyro = None if problem.gyro is None else problem.gyro[rows]
+        beside = [one._replace(values=one.values[rows]) for one in problem.references if not one.reference.of_path]
         return estimate_rate(
-            problem.array, problem.t_s[rows], readings, errors, method="filter", settings=settings, gyro=gyro
+            problem.array,
+            problem.t_s[rows],
+            readings,
+            errors,
+            method="filter",
+            settings=settings,
+            references=beside,
         )
 
     return run

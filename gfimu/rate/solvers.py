@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from gfimu.rate.settings import FilterSettings
 
 __all__ = [
+    "adjust_readings",
     "algebraic_from_rest",
     "filter_readings",
     "integrate_from_rest",
@@ -89,3 +90,10 @@ def smooth_readings(*run: Any, **options: Any) -> RateEstimate:
     from gfimu.rate.filter import smooth_rate
 
     return smooth_rate(*run, **options)
+
+
+def adjust_readings(*run: Any, **options: Any) -> RateEstimate:
+    """Adjust the whole run, as `gfimu.rate.filter.adjust_rate`."""
+    from gfimu.rate.filter import adjust_rate
+
+    return adjust_rate(*run, **options)

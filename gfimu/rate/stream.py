@@ -19,6 +19,7 @@ from gfimu.base.declared import Declared, figure
 from gfimu.base.errors import InputError
 from gfimu.rate.health.live.watched_filter import WatchedRateFilter
 from gfimu.rate.live import LiveRateFilter
+from gfimu.rate.references import Reference
 from gfimu.rate.result import RateEstimate
 from gfimu.rate.sensing import SensorErrors
 from gfimu.rate.settings import FilterSettings
@@ -279,7 +280,9 @@ def filter_stream(
     InputError
         If the first line doesn't name the columns.
     """
-    live = watched or LiveRateFilter(array, errors, period, settings, gyro=fuse_gyro)
+    live = watched or LiveRateFilter(
+        array, errors, period, settings, references=[Reference.gyro(errors)] if fuse_gyro else []
+    )
     reported: dict[str, Any] = live.report.to_dict()
     for sample in stream_samples(lines, array, gyro=fuse_gyro):
         if isinstance(sample, str):

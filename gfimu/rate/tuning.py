@@ -9,7 +9,7 @@ from scipy.special import chdtri
 
 from gfimu.array.quadrature import even_weights
 from gfimu.rate.channel_sets import ChannelSets
-from gfimu.rate.filter_state import Places, Tuning
+from gfimu.rate.filter_state import Places, ReferenceRows, Tuning
 from gfimu.rate.path import PathTuning
 from gfimu.rate.rest_test import RestTest
 from gfimu.rate.sensing import SensorErrors
@@ -69,6 +69,7 @@ def tuning_of(
     at: Places,
     solved_in_motion: int,
     path: PathTuning,
+    references: ReferenceRows,
     open_loop: bool = False,
     compares: bool = False,
     policy: FilterPolicy = FilterPolicy(),
@@ -91,6 +92,8 @@ def tuning_of(
         Components of the state that are estimated before the first rest.
     path : PathTuning
         Axis, gravity and rest of the path.
+    references : ReferenceRows
+        Values beside the readings.
     open_loop : bool
         Whether α is integrated without measurements of the rate.
     compares : bool
@@ -107,7 +110,6 @@ def tuning_of(
     return Tuning(
         period=period,
         overshoot=float(2.0 * np.sum(even_weights(stencil.points)[-stencil.before[0]] ** 2) - 1.0),
-        gyro_variance=errors.gyro_noise_std**2,
         rest_variance=test.rate_std**2,
         rest_limit=test.rate_limit,
         entry_rate=float(chdtri(3, test.entry_rate_level)),
@@ -130,6 +132,7 @@ def tuning_of(
         open_loop=open_loop,
         compares=compares,
         path=path,
+        references=references,
     )
 
 

@@ -12,6 +12,7 @@ import pytest
 
 from gfimu import AccelerometerArray, SensorErrors, calibrate_array, estimate_rate, read_mimu4444
 from gfimu.rate import FilterSettings, filter_rate, smooth_rate
+from gfimu.rate.references import Reference
 
 DARK = FilterSettings(start_omega=None)
 START_S = 550.0  # amid the motion of recording 2
@@ -98,7 +99,7 @@ def test_estimate_goes_on_through_gyro_saturation(motion):
     holes = np.isnan(gyro).any(axis=1)
     assert holes.sum() > 50
     told = sensors(array, timing_std=DISAGREEMENT, gyro_noise_std=0.3)
-    found = filter_rate(array, t, readings, told, DARK, gyro=gyro)
+    found = filter_rate(array, t, readings, told, DARK, references=[Reference.gyro(told).measured(gyro, len(gyro))])
     assert np.isfinite(found.omega).all()
     # Beyond the range of a gyro axis (35 rad/s) the estimate says so.
     assert np.median(np.abs(found.omega[holes]).max(axis=1)) > 28

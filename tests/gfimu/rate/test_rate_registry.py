@@ -56,13 +56,13 @@ def test_every_record_is_complete(method):
 def test_an_unknown_method_is_one_line_with_the_list(ask):
     with pytest.raises(InputError) as refused:
         ask("magic")
-    assert str(refused.value) == "unknown method 'magic'; valid: algebraic, filter, integrate, ml, smoother"
+    assert str(refused.value) == "unknown method 'magic'; valid: algebraic, batch, filter, integrate, ml, smoother"
 
 
 @pytest.mark.parametrize("name", [name for name, method in RATE_METHODS.items() if not method.recursive])
 def test_only_recursive_methods_take_a_gyro(run, name):
-    with pytest.raises(InputError, match=f"^method '{name}' can't use a gyro; use filter or smoother$"):
-        estimate(run, CUBE, method=name, fuse_gyro=True)
+    with pytest.raises(InputError, match=f"^method '{name}' can't use gyro; use filter, smoother or batch$"):
+        estimate(run, CUBE, method=name, use=["gyro"])
 
 
 def turning_at_one(array, t, readings, errors, settings):
@@ -80,7 +80,7 @@ def test_a_new_method_is_one_record(run, monkeypatch):
         np.testing.assert_array_equal(found.omega[:, 2], 1.0)
     errors = SensorErrors.from_parts(CUBE, 100.0)
     assert estimate_rate(CUBE, run.t_s, run.readings, errors, method="mine").method == "mine"
-    with pytest.raises(InputError, match="valid: algebraic, filter, integrate, mine, ml, smoother"):
+    with pytest.raises(InputError, match="valid: algebraic, batch, filter, integrate, mine, ml, smoother"):
         estimate(run, CUBE, method="magic")
 
 

@@ -1,0 +1,104 @@
+"""References that a recording has beside its readings, for an estimate."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gfimu.base.errors import InputError, check_name
+from gfimu.rate.references import Measured, Reference, ReferencePolicy
+from gfimu.rate.sensing import SensorErrors
+from gfimu.recording import Recording
+from gfimu.recording.quantities import GYRO_COLUMNS
+
+__all__ = ["REFERENCE_NAMES", "references_of"]
+
+REFERENCE_COLUMNS: Mapping[str, tuple[str, ...]] = {
+    "gyro": GYRO_COLUMNS,
+    "tacho": ("tacho_rad_s",),
+    "angle": ("angle_rad",),
+    "position": ("position_x_m", "position_y_m", "position_z_m"),
+    "axis": (),
+}
+"""Columns of each reference that an estimate can use; a fixed axis has none."""
+
+REFERENCE_NAMES = tuple(REFERENCE_COLUMNS)
+
+_WHITE = 1.4826 / np.sqrt(6.0)  # standard deviation of white noise over the median size of its second difference
+
+
+def references_of(
+    recording: Recording, names: Sequence[str], axis: NDArray[np.float64], errors: SensorErrors
+) -> tuple[Measured, ...]:
+    """Return references of a recording with their values.
+
+    Parameters
+    ----------
+    recording : Recording
+        Its references stand on its rows.
+    names : sequence of str
+        Those wanted, of `REFERENCE_NAMES`.
+    axis : ndarray, shape (3,)
+        Axis of the table in body axes.
+    errors : SensorErrors
+        Noise and bias of a gyro.
+
+    Raises
+    ------
+    InputError
+        If there is no such reference, or the recording lacks it.
+    """
+    return tuple(_measured(recording, name, axis, errors) for name in dict.fromkeys(names))
+
+
+def _measured(recording: Recording, name: str, axis: NDArray[np.float64], errors: SensorErrors) -> Measured:
+    check_name("reference", name, REFERENCE_NAMES)
+    values = _columns(recording, name)
+    made: Mapping[str, Callable[[], Reference]] = {
+        "gyro": lambda: Reference.gyro(errors),
+        "tacho": lambda: Reference.tachometer(axis, _noise_of(values)),
+        "angle": lambda: Reference.encoder(_noise_of(values)),
+        "position": lambda: Reference.position(_noise_of(values)),
+        "axis": lambda: Reference.fixed_axis(axis),
+    }
+    if name in ("angle", "position"):
+        values = values - values[int(np.argmax(np.isfinite(values).all(axis=1)))]
+    return made[name]().measured(values, len(recording))
+
+
+def _columns(recording: Recording, name: str) -> NDArray[np.float64]:
+    """Return the values (n, k) of a reference."""
+    columns = REFERENCE_COLUMNS[name]
+    missing = [column for column in columns if column not in recording.reference]
+    if missing:
+        raise InputError(f"the recording has no {', '.join(missing)}; record a {name}, or estimate without one")
+    if not columns:
+        return np.zeros((len(recording), 2))
+    values = np.column_stack([recording.reference[column] for column in columns])
+    if not np.isfinite(values).any():
+        raise InputError(f"the recording's {', '.join(columns)} have no value; estimate without a {name}")
+    return _unwrapped(values) if name == "angle" else values
+
+
+def _unwrapped(angle: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return an encoder's angle (n, 1) as one that goes on where it jumps by a turn."""
+    known = np.isfinite(angle[:, 0])
+    if np.ptp(angle[known]) > 2.0 * np.pi * (1.0 + 1e-6):
+        return angle
+    whole = angle.copy()
+    whole[known, 0] = np.unwrap(angle[known, 0])
+    return whole
+
+
+def _noise_of(values: NDArray[np.float64], policy: ReferencePolicy = ReferencePolicy()) -> float:
+    """Return the white noise of values (n, k): by their second differences, and no less than their steps show."""
+    size = float(np.sqrt(np.nanmean(values**2)))
+    changes = np.abs(np.diff(values, axis=0))
+    steps = changes[changes > 0.0]
+    step = float(steps.min()) if steps.size else 0.0
+    second = np.abs(np.diff(values, n=2, axis=0))
+    second = second[np.isfinite(second)]
+    white = _WHITE * float(np.median(second)) if second.size else 0.0
+    return max(white, step / np.sqrt(12.0), policy.least_noise * max(size, 1e-6))

@@ -1,0 +1,129 @@
+"""The adjustment of a whole run against a dense least-squares solution, and what references add to it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rate_worlds import GRAVITY, cube, noise_std, readings, tumble, turntable
+
+from gfimu import AccelerometerArray, InputError, Recording, SensorErrors, estimate, estimate_rate
+from gfimu.rate import FilterSettings
+from gfimu.rate.references import Reference, ReferencePolicy
+
+CUBE = cube()
+RATE = 100.0
+SPREAD = AccelerometerArray(
+    "spread",
+    tuple(replace(chip, position=chip.position + [0.011 * k, -0.007 * k * k, 0.004]) for k, chip in enumerate(CUBE.chips)),
+    CUBE.length_unit,
+)
+BIAS_STD = 0.05  # m/s²
+START_STD = 0.05  # rad/s
+TRAPEZOID = FilterSettings(np.zeros(3), START_STD, quadrature="trapezoid", rest=None, measure_noise=False)
+
+
+class Oracle:
+    """Every reading of a run as a function of ω at its start, of α and p at each sample, and of biases: solved densely.
+
+    ω is the trapezoidal integral of α. Nothing is reduced: no null space, no filter.
+    """
+
+    def __init__(self, array, t, values, noise, start, tacho=None):
+        self.array, self.t, self.values, self.noise, self.start, self.tacho = array, t, values, noise, start, tacho
+        n, c = values.shape
+        step = np.full((n, n), 0.0)
+        for k in range(1, n):
+            step[k] = step[k - 1]
+            step[k, k - 1 : k + 1] += 0.5 * (t[k] - t[k - 1])
+        self.integral = step  # (n, n)
+        self.size = 3 + 6 * n + c + 2
+
+    def parts(self, x):
+        n, c = self.values.shape
+        alpha, p = x[3 : 3 + 3 * n].reshape(n, 3), x[3 + 3 * n : 3 + 6 * n].reshape(n, 3)
+        return x[:3] + self.integral @ alpha, alpha, p, x[3 + 6 * n : 3 + 6 * n + c], x[-2:]
+
+    def system(self, x):
+        """Residuals over their standard deviations, and their slopes."""
+        n, c = self.values.shape
+        omega, alpha, p, bias, (gain, delay) = self.parts(x)
+        of_omega = np.zeros((3 * n, self.size))  # ω of all samples
+        of_omega[:, :3] = np.tile(np.eye(3), (n, 1))
+        of_omega[:, 3 : 3 + 3 * n] = np.kron(self.integral, np.eye(3))
+        residuals, slopes = [], []
+        for channel in range(c):
+            chip = self.array.chip_of_channel[channel]
+            r, axis = self.array.chips[chip].position, np.eye(3)[channel % 3]
+            model = p + np.cross(alpha, r) + np.cross(omega, np.cross(omega, r))
+            slope = np.zeros((n, self.size))
+            for k in range(n):
+                turning = omega[k] @ r * np.eye(3) + np.outer(omega[k], r) - 2 * np.outer(r, omega[k])
+                slope[k] = axis @ turning @ of_omega[3 * k : 3 * k + 3]
+                slope[k, 3 + 3 * k : 6 + 3 * k] += np.cross(r, axis)
+                slope[k, 3 + 3 * n + 3 * k : 6 + 3 * n + 3 * k] += axis
+            slope[:, 3 + 6 * n + channel] = 1.0
+            residuals.append((self.values[:, channel] - model @ axis - bias[channel]) / self.noise[channel])
+            slopes.append(slope / self.noise[channel])
+        priors = np.zeros((3 + c + 2, self.size))
+        priors[range(3), range(3)] = 1 / START_STD
+        priors[range(3, 3 + c), range(3 + 6 * n, 3 + 6 * n + c)] = 1 / BIAS_STD
+        policy = ReferencePolicy()
+        priors[-2, -2], priors[-1, -1] = 1 / policy.gain_std, 1 / policy.delay_std_s
+        residuals.append(-priors @ (x - np.r_[self.start, np.zeros(self.size - 3)]))
+        slopes.append(priors)
+        if self.tacho is not None:
+            values, std = self.tacho
+            slope = of_omega[2::3] * (1 + gain)
+            slope[range(n), 3 + 3 * np.arange(n) + 2] += delay
+            slope[:, -2], slope[:, -1] = omega[:, 2], alpha[:, 2]
+            residuals.append((values - omega[:, 2] * (1 + gain) - delay * alpha[:, 2]) / std)
+            slopes.append(slope / std)
+        return np.concatenate(residuals), np.vstack(slopes), of_omega
+
+    def solve(self, omega):
+        """ω (n, 3) of the most probable run, and its standard deviations, from rates near it."""
+        n = len(self.t)
+        x = np.zeros(self.size)
+        x[:3] = omega[0]
+        x[3 : 3 + 3 * n] = np.gradient(omega, self.t, axis=0).ravel()
+        for _ in range(20):
+            residual, slope, of_omega = self.system(x)
+            change = np.linalg.lstsq(slope, residual, rcond=None)[0]
+            x += change
+            if np.abs(of_omega @ change).max() < 1e-9:
+                break
+        covariance = np.linalg.inv(slope.T @ slope)
+        spread = np.sqrt(np.einsum("ij,jk,ik->i", of_omega, covariance, of_omega))
+        return self.parts(x)[0], spread.reshape(n, 3)
+
+
+def piece(array, *, first=450, count=60, seed=1):
+    """A stretch of a tumble, with noise, biases and a rate at its start that is known to START_STD."""
+    rng = np.random.default_rng(seed)
+    motion = tumble(RATE, 12.0, duration=8.0)
+    rows = slice(first, first + count)
+    noise = noise_std(array, RATE)
+    values = readings(array, motion)[rows] + BIAS_STD * rng.standard_normal(12)
+    values = values + noise * rng.standard_normal(values.shape)
+    start = motion.omega[first] + START_STD * rng.standard_normal(3)
+    return motion.t[rows], motion.omega[rows], values, noise, start, rng
+
+
+@pytest.mark.parametrize("array", [CUBE, SPREAD], ids=["cube", "spread"])
+@pytest.mark.parametrize("with_tacho", [False, True], ids=["alone", "tacho"])
+def test_batch_is_the_dense_least_squares_solution(array, with_tacho):
+    t, omega, values, noise, start, rng = piece(array)
+    errors = SensorErrors.uniform(array, noise, BIAS_STD)
+    tacho, references = None, []
+    if with_tacho:
+        shown = 1.01 * omega[:, 2] + 0.02 * rng.standard_normal(len(t))
+        tacho = shown, 0.02
+        references = [Reference.tachometer([0.0, 0.0, 1.0], 0.02).measured(shown[:, None], len(t))]
+    settings = replace(TRAPEZOID, start_omega=start)
+    found = estimate_rate(array, t, values, errors, method="batch", settings=settings, references=references)
+    np.testing.assert_allclose(found.scale, 1.0)
+    best, std = Oracle(array, t, values, noise, start, tacho).solve(omega)
+    assert np.abs((found.omega - best) / std).max() < 0.05
+    np.testing.assert_allclose(found.std, std, rtol=0.03)
