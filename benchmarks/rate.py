@@ -56,10 +56,10 @@ def scenario(motion: Motion, rate: float, speed: float, runs: int) -> list[str]:
     per_sample = rate_bound(array, motion.omega[rows], float(np.sqrt(np.mean(errors.noise_std**2)))) if speed else None
     bounds: dict[str, float] = {}
     for method in RATE_METHODS:
-        if method in {"filter", "smoother", "integrate"}:
+        if method in {"filter", "smoother", "batch", "integrate"}:
             covariance = posterior_rate_bound(
                 array, motion.t, motion.omega, errors, rest=first_rest(motion), rest_std=RestTest().rate_std,
-                smoother=method == "smoother",
+                smoother=method in {"smoother", "batch"},
             )  # fmt: skip
             bounds[method] = rms(np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))[rows])
         elif per_sample is not None:

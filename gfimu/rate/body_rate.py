@@ -97,7 +97,9 @@ _STEADY_POWER = 2.0  # power of α over that of noise and bias up to which the r
 _GROSS = 25.0  # mean square of the innovations over the noise from which a sample is looked at by itself
 _UNUSABLE = 9.0  # χ² per degree of freedom of its best rate from which a sample has other noise
 _LARGEST_MISFIT = 100.0  # χ² of a sample, beyond which it says no more against a sign
+_SMOOTHED = 4  # samples on either side, whose mean α shows how fast the rate changes, clear of its noise
 _STABLE = 0.1  # radians per step of the correction in (1) at which it is halved
+_STABLE_ANEW = 1.0  # the same about given rates, where an error of the rate does not bend the correction
 
 
 class Workspace(NamedTuple):
@@ -348,7 +350,7 @@ def _correct_alpha(samples, given, k, tables, tuning, carried, level, renewed, t
     place = samples.channel_set[k]
     half = 0.5 * (samples.t[k] - carried.scalars[TIME])
     square = ahead[0] * ahead[0] + ahead[1] * ahead[1] + ahead[2] * ahead[2]
-    turn = 0.0 if len(given.level) > 0 else 4.0 * half / _STABLE
+    turn = 4.0 * half / (_STABLE_ANEW if len(given.level) > 0 else _STABLE)
     share = 1.0 / ((1.0 + turn * turn * tables.cross_size[place] * square) * level * level)
     weight = half * share
     for a in range(3):
@@ -517,7 +519,7 @@ def _take_references(samples, given, k, tuning, carried, unit, gain, record, row
     nis, count, rate, change = 0.0, 0, 0.0, 0.0
     for a in range(3):
         rate += path.axis[a] * about[a]
-        change += path.axis[a] * samples.alpha[k, a]
+        change += path.axis[a] * _change(samples, given, k, a)
     for i in range(len(rows.variance)):
         if np.isnan(samples.references[k, i]):
             continue
@@ -538,6 +540,15 @@ def _take_references(samples, given, k, tuning, carried, unit, gain, record, row
         count += 1
         unit[:] = 0.0
     return nis, count
+
+
+@njit(**INNER)
+def _change(samples, given, k, a):  # type: ignore[no-untyped-def]
+    """Return how fast a component of the rate changes at sample k: by the rates given, or by the mean α about it."""
+    if len(given.level) > 0:
+        first, last = max(k - 1, 0), min(k + 1, len(given.level) - 1)
+        return (given.omega[last, a] - given.omega[first, a]) / (samples.t[last] - samples.t[first])
+    return np.mean(samples.alpha[max(k - _SMOOTHED, 0) : min(k + _SMOOTHED + 1, len(samples.t)), a])
 
 
 @njit(**INNER)

@@ -6,9 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rate_worlds import GRAVITY, cube, noise_std, readings, tumble, turntable
+from path_worlds import World
+from rate_worlds import cube, noise_std, readings, tumble
 
-from gfimu import AccelerometerArray, InputError, Recording, SensorErrors, estimate, estimate_rate
+import gfimu
+from gfimu import AccelerometerArray, InputError, SensorErrors, estimate_rate
 from gfimu.rate import FilterSettings
 from gfimu.rate.references import Reference, ReferencePolicy
 
@@ -16,7 +18,10 @@ CUBE = cube()
 RATE = 100.0
 SPREAD = AccelerometerArray(
     "spread",
-    tuple(replace(chip, position=chip.position + [0.011 * k, -0.007 * k * k, 0.004]) for k, chip in enumerate(CUBE.chips)),
+    tuple(
+        replace(chip, position=chip.position + np.array([0.011 * k, -0.007 * k * k, 0.004]))
+        for k, chip in enumerate(CUBE.chips)
+    ),
     CUBE.length_unit,
 )
 BIAS_STD = 0.05  # m/s²
@@ -125,5 +130,99 @@ def test_batch_is_the_dense_least_squares_solution(array, with_tacho):
     found = estimate_rate(array, t, values, errors, method="batch", settings=settings, references=references)
     np.testing.assert_allclose(found.scale, 1.0)
     best, std = Oracle(array, t, values, noise, start, tacho).solve(omega)
-    assert np.abs((found.omega - best) / std).max() < 0.05
-    np.testing.assert_allclose(found.std, std, rtol=0.03)
+    # At the first sample the filter takes the noise of α for independent of that of the null space; about rates given
+    # it uses nearly all of what they share. The cube shares little.
+    assert np.sqrt(np.mean(np.square((found.omega - best) / std))) < (0.015 if array is CUBE else 0.04)
+    assert np.abs((found.omega - best) / std).max() < 0.15
+    np.testing.assert_allclose(found.std, std, rtol=0.02)
+
+
+def worlds(name, kind="uncalibrated", count=4):
+    return [World(name, seed, kind) for seed in range(count)]
+
+
+def sizes(scores):
+    """Root mean square of normalised errors over several runs, by output."""
+    return {name: np.sqrt(np.mean([np.nanmean(one[name][100:] ** 2) for one in scores])) for name in scores[0]}
+
+
+def test_a_tachometer_and_a_fixed_axis_bring_the_rate_of_a_table_to_theirs():
+    """The tachometer reads 1 % too much and 8 ms late; both are found, and the uncertainty says what is left."""
+    tacho, axis = Reference.tachometer([0.0, 0.0, 1.0], 0.01), Reference.fixed_axis([0.0, 0.0, 1.0])
+    alone, with_both, scores = [], [], []
+    for seed, world in enumerate(worlds("table")):
+        rate = 1.01 * np.interp(world.t - 0.008, world.t, world.omega[:, 2])
+        rate += 0.01 * np.random.default_rng(seed).standard_normal(len(rate))
+        found = world.estimate("batch", [(tacho, rate[:, None]), (axis, np.zeros((len(rate), 2)))])
+        alone.append((world.estimate("batch").omega - world.omega)[300:])
+        with_both.append((found.omega - world.omega)[300:])
+        scores.append(world.scores(found) | {"omega": (found.omega - world.omega) / found.std})
+    assert np.sqrt(np.mean(np.square(with_both))) < 0.6 * np.sqrt(np.mean(np.square(alone)))
+    # Four runs, whose errors are constants for the most part, gains and delays: χ² of 4 to 12 degrees of freedom.
+    for output, size in sizes(scores).items():
+        assert 0.3 < size < 1.7, (output, size)
+
+
+def test_an_encoder_bounds_the_angle_and_fixes_bound_the_position():
+    encoder, fixes = Reference.encoder(1e-3), Reference.position(0.01)
+    rng = np.random.default_rng(3)
+    for method in ("filter", "batch"):
+        angles, positions = [], []
+        for world in worlds("table"):
+            angle = (world.angle + 1e-3 * rng.standard_normal(len(world.t)))[:, None]
+            angles.append(found := world.estimate(method, [(encoder, angle - angle[0])]))
+            assert np.sqrt(np.mean(world.scores(found)["angle"] ** 2)) < 1.7
+        for world in worlds("tumble"):
+            position = world.position + 0.01 * rng.standard_normal(world.position.shape)
+            position[np.arange(len(position)) % 20 > 0] = np.nan  # five a second
+            positions.append(found := world.estimate(method, [(fixes, position - position[0])]))
+            for output in ("position", "velocity", "tilt"):
+                assert np.sqrt(np.mean(world.scores(found)[output][100:] ** 2)) < 2.0, output
+        assert max(found.path.angle_std.max() for found in angles) < 0.2
+        assert max(found.path.position_std.max() for found in positions) < 0.2
+
+
+@pytest.mark.parametrize("method", ["filter", "smoother", "batch"])
+def test_a_tachometer_tells_the_sign_of_a_spin_from_the_first_sample(method):
+    world = World("table", 2)
+    rows = slice(500, None)
+    t, values, omega = world.t[rows], world.readings[rows], world.omega[rows]
+    for sign, read, turned in ((1.0, values, omega), (-1.0, values[::-1], -omega[::-1])):  # backwards in time
+        tacho = Reference.tachometer([0.0, 0.0, 1.0], 0.01).measured(turned[:, 2:], len(t))
+        found = estimate_rate(CUBE, t, read, world.errors, method=method, references=[tacho])
+        assert found.sign.state == "known"
+        assert np.all(sign * found.omega[:, 2] > 0.0)
+
+
+RUN = gfimu.simulate("paper_run", seed=3)
+
+
+def test_references_of_a_recording_by_name():
+    truth = RUN.reference["command_rad_s"]  # which the table follows
+    found = {
+        name: gfimu.estimate(RUN, method="batch", rest_bias=True, use=use)
+        for name, use in (("alone", []), ("angle", ["angle"]), ("tacho and axis", ["tacho", "axis"]))
+    }
+    error = {name: np.sqrt(np.mean((one.omega[:, 2] - truth) ** 2)) for name, one in found.items()}
+    assert error["angle"] < 0.3 * error["alone"]
+    assert np.median(found["tacho and axis"].omega_std[:, 2]) < 0.5 * np.median(found["alone"].omega_std[:, 2])
+    assert np.abs(found["tacho and axis"].omega[:, :2]).max() < np.abs(found["alone"].omega[:, :2]).max()
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"use": ["sextant"]}, "unknown reference 'sextant'; valid: angle, axis, gyro, position, tacho"),
+        ({"use": ["position"]}, "the recording has no position_x_m, position_y_m, position_z_m; record a position"),
+        ({"use": ["tacho"], "method": "ml"}, "method 'ml' can't use tacho; use filter, smoother or batch"),
+        ({"use": ["tacho"], "axis": "z"}, "--use has no use with --axis"),
+    ],
+)
+def test_what_can_not_be_used_is_one_line(options, words):
+    with pytest.raises(InputError, match=words):
+        gfimu.estimate(RUN, **{"method": "batch", **options})
+
+
+def test_values_of_another_shape_are_refused():
+    with pytest.raises(InputError, match=r"^gyro has shape \(5, 2\); 5 times need \(5, 3\)$"):
+        Reference.gyro(SensorErrors.uniform(CUBE, np.ones(12), 1.0)).measured(np.zeros((5, 2)), 5)

@@ -223,7 +223,7 @@ def test_all_methods_behind_one_call(run, method):
 
 def test_bad_input(run):
     motion, values, errors = run
-    with pytest.raises(InputError, match="valid: algebraic, filter, integrate, ml, smoother"):
+    with pytest.raises(InputError, match="valid: algebraic, batch, filter, integrate, ml, smoother"):
         estimate_rate(CUBE, motion.t, values, errors, method="magic")
     with pytest.raises(InputError, match="can't use gyro"):
         estimate_rate(CUBE, motion.t, values, errors, method="ml", gyro=motion.omega)
