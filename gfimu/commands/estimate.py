@@ -25,6 +25,7 @@ from gfimu.commands.known_axis import AXIS, AxisLike, as_known_axis
 from gfimu.commands.shell import options
 from gfimu.commands.shell.declare import Group, Option, command
 from gfimu.rate.registry import RATE_METHODS, rate_method
+from gfimu.recording.quantities import ESTIMATE_REFERENCES
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -38,12 +39,12 @@ __all__ = ["Place", "estimate"]
 
 _FILTERED = " (filter, smoother, batch)"
 _METHOD = Option(f"Angular rate by: {', '.join(RATE_METHODS)}.", "METHOD", offers=tuple(RATE_METHODS))
-_REFERENCES = ("gyro", "tacho", "angle", "position", "axis")
 _USE = Option(
     "What to use beside the readings (filter, smoother, batch): gyro, tacho, angle (encoder), position (columns "
     "position_x_m …), axis (the body turns about the table's axis only); repeat it.",
     "REFERENCE",
-    offers=_REFERENCES,
+    offers=tuple(ESTIMATE_REFERENCES),
+    kind=list[str],
 )
 _FORMS = ("auto", "linear", "joint", "recursive")
 _FORM = Option("How readings turn into p and α: auto, linear, joint or recursive.", "FORM", offers=_FORMS)
@@ -143,7 +144,7 @@ def estimate(
     calibration: given.CalibrationToApply = None,
     start: Annotated[str, options.START] = "any",
     gyro: Annotated[bool, options.GYRO.also(_FILTERED)] = False,
-    use: Annotated[Sequence[str], _USE] = (),
+    use: Annotated[str | Sequence[str], _USE] = (),
     position: Annotated[bool, Option("Integrate to velocity and position too.")] = False,
     place: Annotated[Place, _PLACE] = Place(),
     force: Annotated[bool, options.FORCE] = False,
@@ -208,7 +209,7 @@ def estimate(
                 quaternion0=quaternion0,
                 noise_std=noise_std,
                 with_position=position,
-                use=(*use, *(["gyro"] if gyro else [])),
+                use=(*([use] if isinstance(use, str) else use), *(["gyro"] if gyro else [])),
                 force=force,
                 keep_faulty=keep_faulty,
                 progress=progress,

@@ -93,7 +93,7 @@ def estimate(
         Local gravity for the position, m/s².
     use : sequence of str
         References of the recording that a recursive method uses as well, of
-        `gfimu.motion.references.REFERENCE_NAMES`.
+        `gfimu.recording.quantities.ESTIMATE_REFERENCES`.
     force : bool
         Whether to go on with a recording that its checks refuse; what they found is kept as a warning.
     keep_faulty : bool

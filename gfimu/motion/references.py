@@ -11,20 +11,9 @@ from gfimu.base.errors import InputError, check_name
 from gfimu.rate.references import Measured, Reference, ReferencePolicy
 from gfimu.rate.sensing import SensorErrors
 from gfimu.recording import Recording
-from gfimu.recording.quantities import GYRO_COLUMNS
+from gfimu.recording.quantities import ESTIMATE_REFERENCES
 
-__all__ = ["REFERENCE_NAMES", "references_of"]
-
-REFERENCE_COLUMNS: Mapping[str, tuple[str, ...]] = {
-    "gyro": GYRO_COLUMNS,
-    "tacho": ("tacho_rad_s",),
-    "angle": ("angle_rad",),
-    "position": ("position_x_m", "position_y_m", "position_z_m"),
-    "axis": (),
-}
-"""Columns of each reference that an estimate can use; a fixed axis has none."""
-
-REFERENCE_NAMES = tuple(REFERENCE_COLUMNS)
+__all__ = ["references_of"]
 
 _WHITE = 1.4826 / np.sqrt(6.0)  # standard deviation of white noise over the median size of its second difference
 
@@ -39,7 +28,7 @@ def references_of(
     recording : Recording
         Its references stand on its rows.
     names : sequence of str
-        Those wanted, of `REFERENCE_NAMES`.
+        Those wanted, of `ESTIMATE_REFERENCES`.
     axis : ndarray, shape (3,)
         Axis of the table in body axes.
     errors : SensorErrors
@@ -54,7 +43,7 @@ def references_of(
 
 
 def _measured(recording: Recording, name: str, axis: NDArray[np.float64], errors: SensorErrors) -> Measured:
-    check_name("reference", name, REFERENCE_NAMES)
+    check_name("reference", name, ESTIMATE_REFERENCES)
     values = _columns(recording, name)
     made: Mapping[str, Callable[[], Reference]] = {
         "gyro": lambda: Reference.gyro(errors),
@@ -70,7 +59,7 @@ def _measured(recording: Recording, name: str, axis: NDArray[np.float64], errors
 
 def _columns(recording: Recording, name: str) -> NDArray[np.float64]:
     """Return the values (n, k) of a reference."""
-    columns = REFERENCE_COLUMNS[name]
+    columns = ESTIMATE_REFERENCES[name]
     missing = [column for column in columns if column not in recording.reference]
     if missing:
         raise InputError(f"the recording has no {', '.join(missing)}; record a {name}, or estimate without one")
@@ -94,11 +83,10 @@ def _unwrapped(angle: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _noise_of(values: NDArray[np.float64], policy: ReferencePolicy = ReferencePolicy()) -> float:
     """Return the white noise of values (n, k): by their second differences, and no less than their steps show."""
-    size = float(np.sqrt(np.nanmean(values**2)))
     changes = np.abs(np.diff(values, axis=0))
     steps = changes[changes > 0.0]
     step = float(steps.min()) if steps.size else 0.0
     second = np.abs(np.diff(values, n=2, axis=0))
     second = second[np.isfinite(second)]
     white = _WHITE * float(np.median(second)) if second.size else 0.0
-    return max(white, step / np.sqrt(12.0), policy.least_noise * max(size, 1e-6))
+    return max(white, step / np.sqrt(12.0), policy.least_noise)

@@ -36,7 +36,7 @@ class ReferencePolicy:
     wobble_std : float
         Rate across the axis that bearings leave, rad/s.
     least_noise : float
-        Least noise of a tachometer, encoder or position over the root mean square of its values.
+        Least noise of a value, rad/s, rad or m: that of a good tachometer, a 16-bit encoder, optical tracking.
     """
 
     gain_std: float = 0.01

@@ -6,7 +6,14 @@ import math
 
 from gfimu.base.units import MILLI_G, STANDARD_GRAVITY
 
-__all__ = ["GYRO_COLUMNS", "READING_UNITS", "REFERENCE_UNITS", "TIME_COLUMNS", "reference_quantity"]
+__all__ = [
+    "ESTIMATE_REFERENCES",
+    "GYRO_COLUMNS",
+    "READING_UNITS",
+    "REFERENCE_UNITS",
+    "TIME_COLUMNS",
+    "reference_quantity",
+]
 
 READING_UNITS: dict[str, float | None] = {
     "m_s2": 1.0,
@@ -42,6 +49,15 @@ def reference_quantity(column: str) -> str | None:
 
 GYRO_COLUMNS = ("gyro_x_rad_s", "gyro_y_rad_s", "gyro_z_rad_s")
 """Columns of a recording's gyro, body axes."""
+
+ESTIMATE_REFERENCES: dict[str, tuple[str, ...]] = {
+    "gyro": GYRO_COLUMNS,
+    "tacho": ("tacho_rad_s",),
+    "angle": ("angle_rad",),
+    "position": ("position_x_m", "position_y_m", "position_z_m"),
+    "axis": (),
+}
+"""References that an estimate can use beside the readings, and their columns; a fixed axis has none."""
 
 TIME_COLUMNS = {
     "tacho_rad_s": "tacho_t_s",

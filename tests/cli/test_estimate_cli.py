@@ -281,3 +281,20 @@ def test_a_faulty_channel_is_named_in_table_and_json(gfimu_command, tmp_path):
     assert 15.0 < fault["detected_s"] < 16.0
     assert abs(fault["size"] - 0.3) < 3 * fault["std"] < 0.1
     assert gfimu_command(*how, "--keep-faulty", "--json").code == 0
+
+
+def test_a_run_is_adjusted_with_what_a_table_shows(gfimu_command, tmp_path):
+    gfimu.simulate("paper_run", seed=2).write(tmp_path / "run.parquet")
+    out = tmp_path / "e.csv"
+    how = ("estimate", tmp_path / "run.parquet", "--rest-bias", "--out", out)
+    alone = json.loads(gfimu_command(*how, "--method", "smoother", "--json").stdout)
+    result = gfimu_command(*how, "--method", "batch", "--use", "angle", "--use", "axis", "--json")
+    assert result.code == 0, result.stderr
+    found = json.loads(result.stdout)
+    assert found["angle_std_rad"] < 0.1 * alone["angle_std_rad"]
+    assert found["tacho_rmse_rad_s"] < 0.5 * alone["tacho_rmse_rad_s"]
+    out.unlink()
+    refused = gfimu_command(*how, "--method", "batch", "--use", "position")
+    assert refused.code == 2
+    assert "has no position_x_m" in refused.stderr
+    assert not out.exists()
