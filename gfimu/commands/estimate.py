@@ -127,9 +127,13 @@ def _doing(given: Mapping[str, Any]) -> str:
 
         doing, compiles = "estimating about one axis", must_compile(filter_axis)
     else:
-        doing = f"estimating by {given['method']}"
-        compiles = rate_method(given["method"]).follows_path and must_compile()
-    return f"{doing}; compiling the filter first, once: two minutes or so" if compiles else doing
+        from gfimu.rate.body_rate import follow
+        from gfimu.rate.open_loop import integrate_open
+
+        method = rate_method(given["method"])
+        doing = f"estimating by {method.name}"
+        compiles = method.follows_path and must_compile(follow if method.recursive else integrate_open)
+    return f"{doing}; compiling first, once: a minute or two" if compiles else doing
 
 
 @command(report=_summary, gives=_estimate_of, doing=_doing)

@@ -78,7 +78,7 @@ from gfimu.rate.path import (
 from gfimu.rate.probable_rate import probable_rate, shown_rate, slope_of
 from gfimu.rate.rest_test import MOVES, RESTS
 
-__all__ = ["follow", "smooth_back"]
+__all__ = ["Workspace", "follow", "noise_level", "noise_of_step", "put_estimate", "smooth_back", "step_by_alpha"]
 
 _BROAD = 0.02  # tr P over |ω|² from which the null space is linearised at the most probable rate
 _UNKNOWN = 1.0  # the same, from which all of the rate's variance makes second-order terms
@@ -103,7 +103,7 @@ _STABLE_ANEW = 1.0  # the same about given rates, where an error of the rate doe
 
 
 class Workspace(NamedTuple):
-    """Room for intermediate results, taken once."""
+    """Room for intermediate results of m rows of the null space, taken once."""
 
     ahead: NDArray[np.float64]  # (3,) predicted rate
     along: NDArray[np.float64]  # (3,) slope of a product
@@ -135,16 +135,17 @@ def follow(samples, given, first, last, tables, tuning, carried, out, offset, re
     for k in range(first, last):
         row, place = k + offset, samples.channel_set[k]
         stated = 1.0 + samples.model_error[k]
-        inflation = _noise_level(samples.parity[k], stated, tuning, scalars, counts[ROUGH] > 0)
+        level = noise_level(samples.parity[k], stated, tuning, scalars, counts[ROUGH] > 0)
         if again:
-            inflation = given.level[k]
+            level = given.level[k]
         if counts[STARTED] > 0:
-            _step(samples, given, k, tables, tuning, carried, inflation, transition, added, noise, place_of)
-            if len(given.single.omega) > 0 and not np.isnan(given.single.omega[k, 0]):
-                _take_over(samples, given.single, k, tables, tuning, x, transition, added, noise)
+            step_by_alpha(samples, given, k, tables, tuning, carried, level, transition, added, noise, place_of)
+            if place == counts[LAST_SET] and place >= 0 and tables.mixed[place]:
+                _correct_alpha(samples, given, k, tables, tuning, carried, level, transition, added, noise, place_of)
+            noise_of_step(samples, k, tables, tuning, carried, noise)
             if follows_path:
                 step = samples.t[k] - scalars[TIME]
-                advance_path(samples, given, k, tables, tuning, carried, step, inflation, transition, added, noise)
+                advance_path(samples, given, k, tables, tuning, carried, step, level, transition, added, noise)
             predict(x, p, transition, added, noise, work)
         else:
             for a in range(r):
@@ -161,12 +162,12 @@ def follow(samples, given, first, last, tables, tuning, carried, out, offset, re
                     record.transition[row, a, j] = transition[a, j]
                     record.rows[row, a, j] = p[a, j]
         nis, dof, stated = 0.0, 0, 0.0
-        if place >= 0 and tables.rows[place] > 0 and not tuning.open_loop:
+        if place >= 0 and tables.rows[place] > 0:
             dof = tables.rows[place]
             if not again and p[0, 0] + p[1, 1] + p[2, 2] > _BROAD * (x[0] * x[0] + x[1] * x[1] + x[2] * x[2]):
-                _bound(samples.z[k], tables, tuning, carried, place, inflation, unit, gain, record, row)
-            nis, stated, inflation = _take_products(
-                samples, given, k, tables, tuning, carried, inflation, slopes, gain, record, row, place_of
+                _bound(samples.z[k], tables, tuning, carried, place, level, unit, gain, record, row)
+            nis, stated, level = _take_products(
+                samples, given, k, tables, tuning, carried, level, slopes, gain, record, row, place_of
             )
         square, count = _take_references(samples, given, k, tuning, carried, unit, gain, record, row)
         nis, stated, dof = nis + square, stated + square, dof + count
@@ -192,7 +193,7 @@ def follow(samples, given, first, last, tables, tuning, carried, out, offset, re
             if follows_path:
                 lost = given.levelled[k] if again else attitude_is_lost(tuning, carried)
                 if not lost:
-                    rest_on_path(samples, begin, k, tables, tuning, carried, n, inflation, gain, record, row)
+                    rest_on_path(samples, begin, k, tables, tuning, carried, n, level, gain, record, row)
         counts[STARTED] = 1
         counts[LAST_SET] = place
         scalars[TIME] = samples.t[k]
@@ -201,7 +202,7 @@ def follow(samples, given, first, last, tables, tuning, carried, out, offset, re
         for i in range(m):
             carried.last_z[i] = samples.z[k, i]
         out.rest[row] = rests > 0
-        doubted = place == 0 and not again and _guard(samples, k, tables, tuning, carried, inflation)
+        doubted = place == 0 and not again and _guard(samples, k, tables, tuning, carried, level)
         out.restart[row] = rests == 2 or doubted
         if follows_path and not again:
             settle_path(carried)
@@ -210,32 +211,40 @@ def follow(samples, given, first, last, tables, tuning, carried, out, offset, re
         elif again and given.restart[k]:
             _start_again(carried, tuning, n, given.omega[k], _wide(given.omega[k], tables))
             out.restart[row] = True
-        for a in range(3):
-            out.omega[row, a] = x[a]
-            out.covariance[row, a] = p[a, a]
-        out.covariance[row, 3] = p[0, 1]
-        out.covariance[row, 4] = p[0, 2]
-        out.covariance[row, 5] = p[1, 2]
+        put_estimate(samples, k, row, tables, tuning, carried, level, out)
         out.nis[row] = nis
         out.dof[row] = dof
         out.stated[row] = stated
-        out.inflation[row] = inflation
         if follows_path:
-            for i in range(4):
-                out.path.attitude[row, i] = carried.attitude[i]
-            for i in range(ROWS - 3):
-                out.path.line[row, i] = x[TILT + 3 + i]
-            for i in range(ROWS):
-                out.path.variance[row, i] = p[TILT + i, TILT + i]
-            path = out.path
-            motion_of(samples, k, tables, tuning, x, p, inflation, path.motion[row], path.motion_variance[row])
-            path.levelled[row] = lost
+            out.path.levelled[row] = lost
             if lost:
-                level_anew(samples, begin, k, tables, tuning, carried, inflation, gain, record)
+                level_anew(samples, begin, k, tables, tuning, carried, level, gain, record)
 
 
 @njit(**INNER)
-def _noise_level(parity, stated, tuning, scalars, rough):  # type: ignore[no-untyped-def]
+def put_estimate(samples, k, row, tables, tuning, carried, level, out):  # type: ignore[no-untyped-def]
+    """Put the rate, and where it is followed the path, into a row of the estimates."""
+    x, p = carried.x, carried.covariance
+    for a in range(3):
+        out.omega[row, a] = x[a]
+        out.covariance[row, a] = p[a, a]
+    out.covariance[row, 3] = p[0, 1]
+    out.covariance[row, 4] = p[0, 2]
+    out.covariance[row, 5] = p[1, 2]
+    out.inflation[row] = level
+    if tuning.at.alpha > TILT:
+        path = out.path
+        for i in range(4):
+            path.attitude[row, i] = carried.attitude[i]
+        for i in range(ROWS - 3):
+            path.line[row, i] = x[TILT + 3 + i]
+        for i in range(ROWS):
+            path.variance[row, i] = p[TILT + i, TILT + i]
+        motion_of(samples, k, tables, tuning, x, p, level, path.motion[row], path.motion_variance[row])
+
+
+@njit(**INNER)
+def noise_level(parity, stated, tuning, scalars, rough):  # type: ignore[no-untyped-def]
     """Return the variance of the noise over the stated one, by the parity rows and the innovations so far.
 
     The parity rows show it in the sample itself, shrunk to what stated errors of gains and times make of it, or else to
@@ -259,8 +268,8 @@ def _noise_level(parity, stated, tuning, scalars, rough):  # type: ignore[no-unt
 
 
 @njit(**INNER)
-def _step(samples, given, k, tables, tuning, carried, level, transition, added, noise, place_of):  # type: ignore[no-untyped-def]
-    """Fill in the transition to sample k, (1), and the covariance of its noise."""
+def step_by_alpha(samples, given, k, tables, tuning, carried, level, transition, added, noise, place_of):  # type: ignore[no-untyped-def]
+    """Fill in the transition to sample k by the integral of α, (1), and the covariance of the new ε."""
     x, scalars = carried.x, carried.scalars
     n, m = len(x), samples.z.shape[1]
     ahead, along = place_of.ahead, place_of.along
@@ -305,33 +314,6 @@ def _step(samples, given, k, tables, tuning, carried, level, transition, added, 
                 transition[a, b] -= half * along[b]
             for i in range(m):
                 transition[a, tuning.at.products + i] -= half * tables.alpha_bias[here, a, i]
-    if place == before and place >= 0 and tables.mixed[place] and not tuning.open_loop:
-        _correct_alpha(samples, given, k, tables, tuning, carried, level, renewed, transition, added, noise, place_of)
-    for a in range(3):
-        for b in range(3):
-            noise[a, b] = half * half * noise[3 + a, 3 + b]
-            noise[3 + a, b] = noise[a, 3 + b] = half * noise[3 + a, 3 + b]
-    _add_uncertain_alpha(samples, k, tables, tuning, carried, step, noise)
-
-
-@njit(**INNER)
-def _take_over(samples, single, k, tables, tuning, x, transition, added, noise):  # type: ignore[no-untyped-def]
-    """Fill in the transition to the rate of a single sample, whose error is that of the null space, times its gain."""
-    m, at, place = samples.z.shape[1], tuning.at, samples.channel_set[k]
-    for a in range(3):
-        added[a] = single.omega[k, a]
-        for j in range(len(x)):
-            transition[a, j] = 0.0
-        for i in range(m):
-            for j in range(m):
-                transition[a, at.products + j] -= single.gain[k, a, i] * tables.product_bias[place, i, j]
-            for j in range(at.errors, at.end):
-                transition[a, j] -= single.gain[k, a, i] * samples.product_errors[k, i, j - at.errors]
-        for j in range(at.products, at.end):
-            added[a] -= transition[a, j] * x[j]
-        for b in range(3):
-            noise[a, b] = single.covariance[k, a, b]
-            noise[a, 3 + b] = noise[3 + b, a] = 0.0
 
 
 @njit(**INNER)
@@ -343,7 +325,7 @@ def _about(given, k, end, x, ahead):  # type: ignore[no-untyped-def]
 
 
 @njit(**INNER)
-def _correct_alpha(samples, given, k, tables, tuning, carried, level, renewed, transition, added, noise, place_of):  # type: ignore[no-untyped-def]
+def _correct_alpha(samples, given, k, tables, tuning, carried, level, transition, added, noise, place_of):  # type: ignore[no-untyped-def]
     """Take from ∫α the part of its noise that the null space of both samples shows."""
     x, ahead, along = carried.x, place_of.ahead, place_of.along
     m = samples.z.shape[1]
@@ -353,6 +335,7 @@ def _correct_alpha(samples, given, k, tables, tuning, carried, level, renewed, t
     turn = 4.0 * half / (_STABLE_ANEW if len(given.level) > 0 else _STABLE)
     share = 1.0 / ((1.0 + turn * turn * tables.cross_size[place] * square) * level * level)
     weight = half * share
+    renewed = level * (1.0 + tuning.overshoot) * (1.0 + tuning.overshoot)
     for a in range(3):
         for i in range(m):
             added[a] -= weight * tables.cross_noise[place, a, i] * (carried.last_z[i] + samples.z[k, i])
@@ -373,14 +356,22 @@ def _correct_alpha(samples, given, k, tables, tuning, carried, level, renewed, t
 
 
 @njit(**INNER)
-def _add_uncertain_alpha(samples, k, tables, tuning, carried, step, noise):  # type: ignore[no-untyped-def]
-    """Add what the samples of α leave uncertain of its integral: an undersampled motion, a gap, samples without α.
+def noise_of_step(samples, k, tables, tuning, carried, noise):  # type: ignore[no-untyped-def]
+    """Fill in the covariance of the integral of α to sample k, from that of the new ε.
+
+    Added is what the samples of α leave uncertain: an undersampled motion, a gap, samples without α.
 
     Differences of a well-sampled signal shrink with their order. Where the fifth is larger than the fourth, the noise
     taken off, α changes by itself between samples, and its integral is as uncertain as a random walk's between two
     known ends.
     """
     scalars = carried.scalars
+    step = samples.t[k] - scalars[TIME]
+    half = 0.5 * step
+    for a in range(3):
+        for b in range(3):
+            noise[a, b] = half * half * noise[3 + a, 3 + b]
+            noise[3 + a, b] = noise[a, 3 + b] = half * noise[3 + a, 3 + b]
     power = tables.alpha_noise[0, 0, 0] + tables.alpha_noise[0, 1, 1] + tables.alpha_noise[0, 2, 2]
     extra = 0.0
     if not np.isnan(samples.differences[k, 0]):

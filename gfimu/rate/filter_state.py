@@ -82,7 +82,6 @@ class Tuning(NamedTuple):
     guard_clear: float  # χ² by which a rate of one sample must fit better
     at: Places
     solved_in_motion: int  # components of the state that are estimated before the first rest
-    open_loop: bool  # whether α is integrated without measurements of the rate
     compares: bool  # whether the likelihood of two mirrored rates is to be compared
     path: PathTuning
     references: ReferenceRows
@@ -178,13 +177,12 @@ class Given(NamedTuple):
     restart: NDArray[np.bool_]  # (N,) it starts anew behind this sample
     attitude: NDArray[np.float64]  # (N, 4) where the path is followed
     levelled: NDArray[np.bool_]  # (N,) tilt and velocity are found anew behind this sample
-    single: SingleRates
 
     @classmethod
-    def nothing(cls, single: SingleRates | None = None) -> Given:
-        """Return what a first estimate is given: rates of single samples, or nothing."""
+    def nothing(cls) -> Given:
+        """Return what a first estimate is given."""
         flags = np.empty(0, dtype=np.bool_)
-        return cls(np.empty((0, 3)), np.empty(0), flags, flags, np.empty((0, 4)), flags, single or no_rates())
+        return cls(np.empty((0, 3)), np.empty(0), flags, flags, np.empty((0, 4)), flags)
 
 
 class Estimates(NamedTuple):

@@ -39,6 +39,7 @@ from gfimu.rate.filter_state import (
 from gfimu.rate.increments import integrals
 from gfimu.rate.kernel import Record
 from gfimu.rate.measured_noise import measured_noise, timing_noise
+from gfimu.rate.open_loop import integrate_open
 from gfimu.rate.path import ROWS, TILT, rest_on_path
 from gfimu.rate.path_start import PathStart, levelled, settled, with_attitude
 from gfimu.rate.reduction import Reduction
@@ -84,8 +85,6 @@ class LiveRateFilter:
         Start, quadrature, rest, noise.
     references : sequence of Reference
         What is measured beside the readings.
-    open_loop : bool
-        Whether α is integrated, with the biases of a first rest, and the rate is measured nowhere else.
     path : PathStart, optional
         Where the path starts, if attitude, velocity and position of a whole recording are to be followed as well.
     progress : callable, optional
@@ -111,7 +110,6 @@ class LiveRateFilter:
         settings: FilterSettings | None = None,
         *,
         references: Sequence[Reference] = (),
-        open_loop: bool = False,
         path: PathStart | None = None,
         progress: Callable[[float], object] | None = None,
     ) -> None:
@@ -126,7 +124,7 @@ class LiveRateFilter:
         of_rate = self._references.weights[self._references.first < TILT]
         self.sign_is_measured = len(of_rate) > 0
         self._rate_is_measured = bool(np.linalg.matrix_rank(of_rate) == 3)
-        self._open_loop, self._path, self._progress = open_loop, path, progress
+        self._path, self._progress = path, progress
         self._waiting: list[tuple[NDArray[np.float64], ...]] = []
         self._last_time = -np.inf
         self._received = 0
@@ -252,8 +250,7 @@ class LiveRateFilter:
         prior = start.bias_factor * prior
         at = Places.of(m, q, path=self._path is not None, references=len(self._reference_std))
         self.tuning: Tuning = tuning_of(
-            sets, self.errors, self.period, self.settings, at=at, compares=start.sign_open and not self._open_loop,
-            open_loop=self._open_loop,
+            sets, self.errors, self.period, self.settings, at=at, compares=start.sign_open,
             solved_in_motion=at.end if self._rate_is_measured else at.products,
             path=(self._path or PathStart()).tuning(self._window),
             references=self._references,
@@ -278,7 +275,7 @@ class LiveRateFilter:
             carried.scalars[[TIME, LAST_ALPHA]] = t[len(complete) - 1]
             self._resumed = len(complete)
         self.carried = [carried]
-        if start.sign_open and start.omega.any() and not self._open_loop:
+        if start.sign_open and start.omega.any():
             mirrored = carried.copy()
             mirrored.x[:3] = -start.omega
             self.carried.append(mirrored)
@@ -327,7 +324,7 @@ class LiveRateFilter:
             rows = slice(0, self._resumed - first)
             out.omega[rows], out.covariance[rows] = 0.0, 0.0
             out.covariance[rows, :3] = self.tuning.rest_variance
-            out.rest[rows.stop - 1] = True
+            out.rest[[end - 1 - first for end in range(self._window, self._resumed + 1, self._window)]] = True
         return out
 
     def _filter(self, first: int, last: int, outputs: list[Estimates], offset: int) -> None:
@@ -534,7 +531,7 @@ class LiveRateFilter:
         start.counts[SOLVED] = len(start.x)
         for _ in range(_PASSES):
             before, attitude = out.omega.copy(), out.path.attitude.copy()
-            given = Given(before, out.inflation, out.rest, out.restart, attitude, out.path.levelled, no_rates())
+            given = Given(before, out.inflation, out.rest, out.restart, attitude, out.path.levelled)
             again = self._resting(0, len(out.nis))
             end = start.copy() if self._path is None else with_attitude(start.copy(), attitude[0])
             kept = self._forward(end, given, again, report)
@@ -588,11 +585,17 @@ class LiveRateFilter:
             self._start_path(carried, self._path)
         out = self._resting(0, until)
         self._rest_path(carried, out, carried.attitude, np.diag(carried.covariance)[TILT:])
-        self._forward(carried, Given.nothing(single), out, lambda share: None)
+        integrate_open(
+            self._samples, Given.nothing(), single or no_rates(), self._resumed, until, self.sets.tables(),
+            self.tuning, carried, out,
+        )  # fmt: skip
         return out
 
     def leading_rest(self, t: ArrayLike, readings: ArrayLike) -> tuple[Constants, NDArray[np.bool_]]:
-        """Reduce a whole recording; returns the constants by the rest at its start, if any, and the samples of it."""
+        """Reduce a whole recording, and begin behind the rest at its start, if any.
+
+        Returns the constants by that rest, and the samples (n,) of it.
+        """
         self._take_recording(t, readings)
         self._prepare(closing=True)
         window, at = self._window, self.tuning.at
@@ -603,9 +606,13 @@ class LiveRateFilter:
             moves = np.flatnonzero(np.append(verdicts, MOVES) < DOUBTED)[0]
             rests = np.flatnonzero(verdicts[:moves] == RESTS)  # a block in doubt is rest where the rest goes on
             rest[: (1 + (int(rests[-1]) + 1 if rests.size else 0)) * window] = True
-        self._samples.still[~rest] = 0  # no other one is used
         usable = np.where(np.abs(self._raw) < self.errors.limits, self._raw, np.nan)[rest]
-        return self._learnt(prior, usable[np.isfinite(usable).all(axis=1)]), rest
+        constants = self._learnt(prior, usable[np.isfinite(usable).all(axis=1)])
+        if self._resumed:
+            self._resumed = int(rest.sum())
+            constants.put(self.carried[0], at)
+            self.carried[0].scalars[[TIME, LAST_ALPHA]] = self._samples.t[self._resumed - 1]
+        return constants, rest
 
     def constants(self, index: int = 0) -> Constants:
         """Return biases and errors of the channels as a track knows them now."""

@@ -115,7 +115,7 @@ def _estimate(
     ratio = noise_ratio(array, rows, errors, period) if rows.shape == (len(times), array.n_channels) else 1.0
     chosen = replace(settings or FilterSettings(), measure_noise=False)
     louder = replace(errors, noise_std=ratio * errors.noise_std)
-    live = LiveRateFilter(array, louder, period, chosen, open_loop=True, path=path)
+    live = LiveRateFilter(array, louder, period, chosen, path=path)
     sensitivity = live.sets.full.sensitivity
     if live.sets.products < least_rank or np.linalg.matrix_rank(sensitivity, tol=1e-9) < least_rank:
         raise GeometryError(

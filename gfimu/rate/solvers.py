@@ -44,7 +44,7 @@ def integrate_from_rest(
     from gfimu.rate.result import SignDecision
 
     times, period = increasing_times(t, "the integration")
-    live = LiveRateFilter(array, errors, period, settings, open_loop=True, path=path)
+    live = LiveRateFilter(array, errors, period, settings, path=path)
     live.leading_rest(times, readings)
     start = live.start
     assert start is not None

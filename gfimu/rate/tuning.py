@@ -70,7 +70,6 @@ def tuning_of(
     solved_in_motion: int,
     path: PathTuning,
     references: ReferenceRows,
-    open_loop: bool = False,
     compares: bool = False,
     policy: FilterPolicy = FilterPolicy(),
 ) -> Tuning:
@@ -94,8 +93,6 @@ def tuning_of(
         Axis, gravity and rest of the path.
     references : ReferenceRows
         Values beside the readings.
-    open_loop : bool
-        Whether α is integrated without measurements of the rate.
     compares : bool
         Whether two mirrored rates are followed.
     policy : FilterPolicy, optional
@@ -104,7 +101,7 @@ def tuning_of(
     m, d = sets.products, len(sets.parity_rows)
     sees = m > 0 and np.linalg.matrix_rank(sets.full.sensitivity, tol=1e-9) >= 3
     stencil = QUADRATURES[settings.quadrature]
-    window = max(4, round(policy.guard_s / period)) if sees and not open_loop else 0
+    window = max(4, round(policy.guard_s / period)) if sees else 0
     test = settings.rest or RestTest()
     half, second, parity = (_share(period, one) for one in (policy.innovation_s, policy.colour_s, policy.parity_s))
     return Tuning(
@@ -129,7 +126,6 @@ def tuning_of(
         guard_clear=policy.guard_clear,
         at=at,
         solved_in_motion=solved_in_motion,
-        open_loop=open_loop,
         compares=compares,
         path=path,
         references=references,
