@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from gfimu.rate.filter import filter_rate, smooth_rate
     from gfimu.rate.health.fault import HealthCode
     from gfimu.rate.path_start import PathStart
+    from gfimu.rate.references import Measured, Reference, ReferencePolicy
     from gfimu.rate.rest_test import RestTest, constant_readings
     from gfimu.rate.result import joined_estimates
     from gfimu.rate.sensing import ChannelTables

@@ -23,15 +23,17 @@ READING_UNITS: dict[str, float | None] = {
 }
 """Units of a sensing axis and their factor to m/s²; counts (``lsb``) need the part's sensitivity."""
 
+_LENGTHS = {"m": 1.0, "mm": 1e-3}
+
 REFERENCE_UNITS: dict[str, dict[str, float]] = {
     "t": {"s": 1.0},
     "tacho": {"rad_s": 1.0, "deg_s": math.pi / 180.0, "rpm": math.pi / 30.0},
     "command": {"rad_s": 1.0, "deg_s": math.pi / 180.0, "rpm": math.pi / 30.0},
     "angle": {"rad": 1.0, "deg": math.pi / 180.0},
-    "position_x": {"m": 1.0, "mm": 1e-3},
-    "position_y": {"m": 1.0, "mm": 1e-3},
-    "position_z": {"m": 1.0, "mm": 1e-3},
-    "carriage": {"m": 1.0, "mm": 1e-3},
+    "position_x": _LENGTHS,
+    "position_y": _LENGTHS,
+    "position_z": _LENGTHS,
+    "carriage": _LENGTHS,
     "carriage_speed": {"m_s": 1.0, "mm_s": 1e-3},
     "carriage_acceleration": {"m_s2": 1.0, "mm_s2": 1e-3, "g": STANDARD_GRAVITY},
     "temperature": {"degC": 1.0},

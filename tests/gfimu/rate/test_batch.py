@@ -11,8 +11,7 @@ from rate_worlds import cube, noise_std, readings, tumble
 
 import gfimu
 from gfimu import AccelerometerArray, InputError, SensorErrors, estimate_rate
-from gfimu.rate import FilterSettings
-from gfimu.rate.references import Reference, ReferencePolicy
+from gfimu.rate import FilterSettings, Reference, ReferencePolicy
 
 CUBE = cube()
 RATE = 100.0

@@ -10,11 +10,10 @@ from rate_worlds import cube, measure, readings, sensor_errors, tumble, turntabl
 
 from gfimu import AccelerometerArray, GeometryError, InputError, LiveRateFilter, SensorErrors, estimate_rate
 from gfimu.array.quadrature import even_weights
-from gfimu.rate import FilterSettings, filter_rate, smooth_rate
+from gfimu.rate import FilterSettings, Reference, filter_rate, smooth_rate
 from gfimu.rate.body_rate import follow, smooth_back
 from gfimu.rate.channel_sets import ChannelSets
 from gfimu.rate.methods import RATE_METHODS
-from gfimu.rate.references import Reference
 from gfimu.rate.result import joined_estimates
 
 CUBE = cube()

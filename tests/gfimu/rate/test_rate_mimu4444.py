@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 from gfimu import AccelerometerArray, SensorErrors, calibrate_array, estimate_rate, read_mimu4444
-from gfimu.rate import FilterSettings, filter_rate, smooth_rate
-from gfimu.rate.references import Reference
+from gfimu.rate import FilterSettings, Reference, filter_rate, smooth_rate
 
 DARK = FilterSettings(start_omega=None)
 START_S = 550.0  # amid the motion of recording 2
