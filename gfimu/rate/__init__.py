@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from gfimu.rate.references import Measured, Reference, ReferencePolicy
     from gfimu.rate.rest_test import RestTest, constant_readings
     from gfimu.rate.result import joined_estimates
-    from gfimu.rate.sensing import ChannelTables
     from gfimu.rate.settings import FilterSettings
     from gfimu.rate.start import start_of_still
     from gfimu.rate.stream import filter_stream

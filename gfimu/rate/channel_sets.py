@@ -58,6 +58,10 @@ class ChannelSet(NamedTuple):
         K' and T'.
     force_bias, force_parity : ndarray, shapes (3, m), (3, d)
         K_p and K_p'.
+    null_rows : ndarray, shape (c − 6, c)
+        Z and behind it the parity rows of this set; zero rows behind those that there are.
+    nulls : int
+        How many there are; −1 if the set can't see α.
     inverse : ndarray, shape (6, m)
         M⁺, which gives the products from z as far as they are seen.
     square_seen : ndarray of bool, shape (3,)
@@ -102,6 +106,13 @@ class ChannelSet(NamedTuple):
     cross_square: NDArray[np.float64]
     cross_size: float
     inverse_bias: NDArray[np.float64]
+    null_rows: NDArray[np.float64]
+    nulls: int
+
+    @property
+    def null_sensitivity(self) -> NDArray[np.float64]:
+        """What ``null_rows`` see of the products, shape (c − 6, 6): M, and nothing in the parity rows."""
+        return np.pad(self.sensitivity, ((0, len(self.null_rows) - len(self.sensitivity)), (0, 0)))
 
 
 class SetTables(NamedTuple):
@@ -217,8 +228,8 @@ class ChannelSets:
         everything = bool(present.all())
         rows, leak, noise = np.zeros((6, c)), np.zeros((6, 6)), np.zeros((6, 6))  # of [α; p]
         product_rows, sensitivity, mixing = np.zeros((m, c)), np.zeros((m, 6)), np.zeros((m, m + d))
-        biases = np.zeros((6, m + d))
-        count = -1
+        biases, nulls = np.zeros((6, m + d)), np.zeros((m + d, c))
+        count = known = -1
         if np.linalg.matrix_rank(self.array.regression_matrix[present] / self._scale, tol=1e-6) == 6:
             # Combinations of the null space that don't touch the missing channels.
             ordered, count = self._basis, m
@@ -226,7 +237,8 @@ class ChannelSets:
                 smaller = null_rows(self._basis[:, ~present].T) @ self._basis
                 smaller[:, ~present] = 0.0
                 ordered, count = _by_products(smaller, self.array.centripetal_matrix)
-            product_rows[:count] = ordered[:count]
+            known = len(ordered)
+            nulls[:known], product_rows[:count] = ordered, ordered[:count]
             mixing[:count] = ordered[:count] * self._variance @ self._basis.T
             sensitivity[:count] = _clean(product_rows[:count] @ self.array.centripetal_matrix)
             rows = self._motion_rows(present, product_rows[:count])
@@ -244,6 +256,7 @@ class ChannelSets:
             np.asarray(inverse, dtype=np.float64), seen, everything and not leak[:3].any(), mixed,
             float(np.sum(sensitivity**2)), cross @ sensitivity, cross @ mixing[:, :m], cross @ cross.T,
             float(np.sum((cross @ sensitivity) ** 2)), np.asarray(inverse[:3] @ mixing[:, :m], dtype=np.float64),
+            nulls, known,
         )  # fmt: skip
 
     def _whitened(self, basis: NDArray[np.float64]) -> NDArray[np.float64]:

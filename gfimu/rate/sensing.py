@@ -1,15 +1,4 @@
-"""What the rate estimators know about the sensors: their errors, and what each set of working channels determines.
-
-For any set of working channels the readings y split into two parts that share no unknown motion:
-
-* the angular acceleration, α = A y − L s(ω) − (bias), with A J = [I 0]: the filter integrates it;
-* the null space of J, z = Z y = M s(ω) + (bias) + noise: the filter's measurement of the products s of ω.
-
-A is the unweighted left inverse wherever J is orthogonal to Q (no products of ω in α), otherwise the joint form that
-removes the products as far as the null space sees them well; L is what is left. Z is whitened: its noise has unit
-variance. Biases are constant per channel; what the filter can know of them is b_α = A b and b_z = Z b of the full set,
-and every smaller set of channels sees linear combinations of those: A' = A + K Z and Z' = T Z.
-"""
+"""What the rate estimators know about the errors of the sensors: from data sheets, or as a calibration leaves them."""
 
 from __future__ import annotations
 
@@ -21,19 +10,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gfimu.array.array import AccelerometerArray
-from gfimu.array.kinematics import require_all_motions
-from gfimu.array.observability import null_rows
 from gfimu.array.parts.part import white_noise_std
 from gfimu.array.parts.part_file import PartFile
 from gfimu.base.errors import InputError
 from gfimu.base.short_repr import short_repr
 
-__all__ = ["ChannelTables", "SensorErrors", "calibrated_bias_std", "step_of_readings"]
+__all__ = ["SensorErrors", "calibrated_bias_std", "step_of_readings"]
 
-_RANK_TOLERANCE = 1e-9
 _LARGEST = 1e6  # numerical: m/s², far beyond any part
-_SEEN = 1e-6  # numerical: of the best seen product
-_WEAK = 0.1  # products seen more weakly than this share of the best are not used to clean α
 _LEAST_NOISE_LSB = 0.3  # LSB: below that equal readings prove nothing
 _FOR_STEP = 20_000  # numerical: samples in which the step of the readings is looked for
 _EQUAL_READINGS = 1e-7  # probability per sample at which equal readings count as a stuck channel
@@ -248,128 +232,6 @@ def _turn_of_chips(array: AccelerometerArray) -> float:
     parts = [PartFile.load(chip.part, array.part_files) for chip in array.chips]
     squares = [part.misalignment_std_rad**2 + part.cross_axis_std**2 / 2.0 for part in parts]
     return float(np.sqrt(np.mean(squares)))
-
-
-class ChannelTables:
-    """Matrices of α and of the null space for each set of working channels met so far.
-
-    Set 0 has every channel. Another set is added when a sample needs it (`index`). All tables are stacked over the
-    sets; a missing channel has zero columns.
-
-    Parameters
-    ----------
-    array : AccelerometerArray
-        An array that sees all six motions.
-    errors : SensorErrors
-        Noise of its channels.
-
-    Raises
-    ------
-    GeometryError
-        If the array can't see all six motions.
-    """
-
-    def __init__(self, array: AccelerometerArray, errors: SensorErrors) -> None:
-        require_all_motions(array)
-        if len(errors.noise_std) != array.n_channels:
-            raise InputError(
-                f"noise_std holds {len(errors.noise_std)} numbers; array {array.name!r} has {array.n_channels} channels"
-            )
-        self.array = array
-        self._variance = errors.noise_std**2
-        self._length_scale = np.array([array.length_unit] * 3 + [1.0] * 3)
-        c = array.n_channels
-        basis = self._whitened_null_space()
-        self.n_null = len(basis)
-        self._basis = basis
-        self._base_alpha = self._alpha_rows(np.ones(c, dtype=bool), basis)
-        d = self.n_null
-        self.masks = np.zeros(0, dtype=np.int64)
-        self.alpha_rows = np.zeros((0, 3, c))
-        self.alpha_bias = np.zeros((0, 3, d))  # K
-        self.alpha_leak = np.zeros((0, 3, 6))  # L
-        self.alpha_noise = np.zeros((0, 3, 3))
-        self.null_rows = np.zeros((0, d, c))  # Z
-        self.null_sensitivity = np.zeros((0, d, 6))  # M
-        self.null_bias = np.zeros((0, d, d))  # T
-        self.null_count = np.zeros(0, dtype=np.int64)  # −1: α can't be seen with this set
-        self.plain = np.zeros(0, dtype=np.bool_)  # α = A y − b_α with nothing else to subtract
-        self.products = np.zeros((0, 6, d))  # M⁺, of the products of ω
-        self.square_seen = np.zeros((0, 3), dtype=np.bool_)  # whether the null space shows the square of each axis
-        self.null_size = np.zeros(0)  # ‖M‖², s⁴/rad⁴ in units of the noise
-        self.index(0)
-
-    def index(self, missing: int) -> int:
-        """Place of the set without the channels whose bits are set in ``missing``, built if new."""
-        known = np.flatnonzero(self.masks == missing)
-        if known.size:
-            return int(known[0])
-        c, d = self.array.n_channels, self.n_null
-        present = np.array([not (missing >> channel) & 1 for channel in range(c)])
-        rows = np.zeros((3, c))
-        bias, leak, noise = np.zeros((3, d)), np.zeros((3, 6)), np.zeros((3, 3))
-        rows_of_null, sensitivity, combination = np.zeros((d, c)), np.zeros((d, 6)), np.zeros((d, d))
-        products = np.zeros((6, d))
-        count = -1
-        if np.linalg.matrix_rank(self.array.regression_matrix[present] / self._length_scale, tol=1e-6) == 6:
-            # Combinations of the null space that don't touch the missing channels.
-            kept = np.eye(d) if missing == 0 else null_rows(self._basis[:, ~present].T)
-            count = len(kept)
-            smaller = kept @ self._basis  # (count, c)
-            smaller[:, ~present] = 0.0
-            rows_of_null[:count], combination[:count] = smaller, kept
-            sensitivity[:count] = _clean(smaller @ self.array.centripetal_matrix)
-            rows = self._base_alpha if missing == 0 else self._alpha_rows(present, smaller)
-            bias = (rows - self._base_alpha) * self._variance @ self._basis.T  # (3, d), Z R Zᵀ = I
-            leak = _clean(rows @ self.array.centripetal_matrix)
-            noise = rows * self._variance @ rows.T
-            products = np.asarray(np.linalg.pinv(sensitivity, rcond=_SEEN), dtype=np.float64)
-        seen = np.abs((products @ sensitivity)[:3] - np.eye(6)[:3]).max(axis=1) < _SEEN
-        self.masks = np.append(self.masks, np.int64(missing))
-        self.alpha_rows = np.concatenate([self.alpha_rows, rows[None]])
-        self.alpha_bias = np.concatenate([self.alpha_bias, bias[None]])
-        self.alpha_leak = np.concatenate([self.alpha_leak, leak[None]])
-        self.alpha_noise = np.concatenate([self.alpha_noise, noise[None]])
-        self.null_rows = np.concatenate([self.null_rows, rows_of_null[None]])
-        self.null_sensitivity = np.concatenate([self.null_sensitivity, sensitivity[None]])
-        self.null_bias = np.concatenate([self.null_bias, combination[None]])
-        self.null_count = np.append(self.null_count, np.int64(count))
-        self.plain = np.append(self.plain, not (leak.any() or missing))
-        self.products = np.concatenate([self.products, products[None]])
-        self.square_seen = np.concatenate([self.square_seen, seen[None]])
-        self.null_size = np.append(self.null_size, np.sum(sensitivity**2))
-        return len(self.masks) - 1
-
-    def bias_covariance(self, bias_std: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Covariance of [b_α; b_z] for independent channel biases, shape (3 + d, 3 + d)."""
-        rows = np.vstack([self._base_alpha, self._basis])
-        return rows * bias_std**2 @ rows.T
-
-    def _whitened_null_space(self) -> NDArray[np.float64]:
-        """Rows Z with Z J = 0 and unit noise, those that see ω best first."""
-        basis = null_rows((self.array.regression_matrix / self._length_scale).T)  # (c - 6, c)
-        if len(basis) == 0:
-            return basis
-        cholesky = np.linalg.cholesky(basis * self._variance @ basis.T)
-        white = np.linalg.solve(cholesky, basis)
-        rotation, _, _ = np.linalg.svd(white @ self.array.centripetal_matrix)
-        return rotation.T @ white
-
-    def _alpha_rows(self, present: NDArray[np.bool_], null_rows: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Rows A of the working channels: unweighted left inverse, cleaned of ω² by well-seen products."""
-        rows = np.zeros((3, self.array.n_channels))
-        inverse = np.linalg.pinv(self.array.regression_matrix[present] / self._length_scale)
-        rows[:, present] = inverse[:3] / self.array.length_unit
-        leak = _clean(rows @ self.array.centripetal_matrix)
-        if leak.any() and len(null_rows):
-            rows = rows - leak @ np.linalg.pinv(null_rows @ self.array.centripetal_matrix, rcond=_WEAK) @ null_rows
-        return rows
-
-
-def _clean(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Set rounding errors to zero, so that what cancels exactly is an exact zero."""
-    largest = np.abs(matrix).max(initial=0.0)
-    return np.where(np.abs(matrix) > _RANK_TOLERANCE * max(1.0, largest), matrix, 0.0)
 
 
 def calibrated_bias_std(metadata: Mapping[str, Any], array: AccelerometerArray) -> NDArray[np.float64] | None:

@@ -68,15 +68,15 @@ def test_smoother_equals_the_inverse_of_the_whole_information(noise):
     t = np.arange(n) * period
     errors = SensorErrors.uniform(CUBE, noise, bias)
     bound = posterior_rate_bound(CUBE, t, rates, errors, start_std=0.5, smoother=True)
-    from gfimu.rate import ChannelTables, omega_products_jacobian
+    from gfimu.rate import ChannelSets, omega_products_jacobian
 
-    tables = ChannelTables(CUBE, errors)
+    full = ChannelSets(CUBE, errors.noise_std).full
+    rows = np.vstack([full.alpha_rows, full.null_rows])
     # Unknowns: ω_0, b_α, b_z, ε_0 … ε_{n−1}; everything later is linear in them.
     size = 3 + 3 + 6 + 3 * n
     information = np.zeros((size, size))
     information[:3, :3] = np.eye(3) / 0.5**2
-    information[3:12, 3:12] = np.linalg.inv(tables.bias_covariance(errors.bias_std))
-    rows = np.vstack([tables.alpha_rows[0], tables.null_rows[0]])
+    information[3:12, 3:12] = np.linalg.inv(rows * errors.bias_std**2 @ rows.T)
     both = np.linalg.inv(rows * errors.noise_std**2 @ rows.T)
     maps = []
     current = np.zeros((3, size))
@@ -88,7 +88,7 @@ def test_smoother_equals_the_inverse_of_the_whole_information(noise):
             for j in (k - 1, k):
                 current[:, 12 + 3 * j : 15 + 3 * j] += period / 2 * np.eye(3)
         maps.append(current)
-        h = tables.null_sensitivity[0] @ omega_products_jacobian(rates[k]) @ current
+        h = full.null_sensitivity @ omega_products_jacobian(rates[k]) @ current
         h[:, 6:12] += np.eye(6)
         h = np.vstack([np.eye(3, size, 12 + 3 * k), h])  # the noise of α, −ε, and that of the null space
         information += h.T @ both @ h

@@ -30,7 +30,7 @@ from gfimu.budget.tolerances.known_motion import KnownMotion, cross_matrix
 from gfimu.motion.attitude import to_rotation
 from gfimu.motion.navigation import level
 from gfimu.rate.bounds.sample import omega_products_jacobian
-from gfimu.rate.sensing import ChannelTables, SensorErrors
+from gfimu.rate.channel_sets import ChannelSets
 
 __all__ = ["ErrorMaps", "error_maps", "null_space_maps", "null_space_of"]
 
@@ -108,9 +108,8 @@ def null_space_maps(array: AccelerometerArray, motion: KnownMotion) -> Floats | 
 
 def null_space_of(array: AccelerometerArray, motion: KnownMotion) -> tuple[Floats, Floats]:
     """Return Z, shape (d, c), and M, shape (d, 6), whitened with the data sheets' noise as the estimators have it."""
-    noise = white_noise_std(array, 1.0 / motion.step)
-    tables = ChannelTables(array, SensorErrors.uniform(array, noise))
-    return tables.null_rows[0], tables.null_sensitivity[0]
+    full = ChannelSets(array, white_noise_std(array, 1.0 / motion.step)).full
+    return full.null_rows, full.null_sensitivity
 
 
 def _dynamics(motion: KnownMotion, feedback: Floats, of_p: Floats) -> tuple[Floats, Floats]:

@@ -16,7 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 from gfimu.array.array import AccelerometerArray
 from gfimu.base.errors import InputError
 from gfimu.rate.bounds.sample import omega_products_jacobian, require_positive
-from gfimu.rate.sensing import ChannelTables, SensorErrors
+from gfimu.rate.channel_sets import ChannelSet, ChannelSets
+from gfimu.rate.sensing import SensorErrors
 
 __all__ = ["posterior_rate_bound"]
 
@@ -70,19 +71,20 @@ def posterior_rate_bound(
     require_positive(start_std, "start_std", "rad/s")
     require_positive(rest_std, "rest_std", "rad/s")
     known = np.zeros(len(times), dtype=bool) if rest is None else np.asarray(rest, dtype=bool)
-    tables = ChannelTables(array, errors)
-    if tables.alpha_leak[0].any():
+    full = ChannelSets(array, errors.noise_std).full
+    if full.leak.any():
         raise InputError(f"array {array.name!r} leaves products of the angular rate in α; the bound needs one without")
-    d = tables.n_null
-    readout = _readout(tables, errors)
+    d = full.nulls
+    readout = _readout(full, errors)
+    rows = np.vstack([full.alpha_rows, full.null_rows])
     # The null space scaled to unit noise: what it says of ω, and with it of the biases and of ε.
-    slopes = readout[:, 6 : 6 + d] @ tables.null_sensitivity[0] @ omega_products_jacobian(rates)  # (n, d, 3)
+    slopes = readout[:, 6 : 6 + d] @ full.null_sensitivity @ omega_products_jacobian(rates)  # (n, d, 3)
     start = np.zeros((9 + d, 9 + d))
     start[:3, :3] = np.eye(3) * start_std**2
-    start[3 : 6 + d, 3 : 6 + d] = tables.bias_covariance(errors.bias_std)
-    filtered = _filter_bound(times, slopes, readout, tables.alpha_noise[0], start, known, rest_std)
+    start[3 : 6 + d, 3 : 6 + d] = rows * errors.bias_std**2 @ rows.T
+    filtered = _filter_bound(times, slopes, readout, full.alpha_noise, start, known, rest_std)
     if smoother:
-        _smoother_bound(times, slopes, readout, tables.alpha_noise[0], known, rest_std, filtered)
+        _smoother_bound(times, slopes, readout, full.alpha_noise, known, rest_std, filtered)
     return np.ascontiguousarray(filtered[:, :3, :3])
 
 
@@ -91,11 +93,11 @@ def posterior_rate_bound(
 # that of the null space depends on it: z = M s + b_z − Γ ε + (the rest).
 
 
-def _readout(tables: ChannelTables, errors: SensorErrors) -> NDArray[np.float64]:
+def _readout(full: ChannelSet, errors: SensorErrors) -> NDArray[np.float64]:
     """H of the null space but for its slopes, scaled so that the noise that ε doesn't explain has unit variance."""
-    d = tables.n_null
-    crossed = tables.null_rows[0] * errors.noise_std**2 @ tables.alpha_rows[0].T  # (d, 3)
-    explained = np.linalg.solve(tables.alpha_noise[0], crossed.T).T  # Γ
+    d = full.nulls
+    crossed = full.null_rows * errors.noise_std**2 @ full.alpha_rows.T  # (d, 3)
+    explained = np.linalg.solve(full.alpha_noise, crossed.T).T  # Γ
     white = np.linalg.inv(np.linalg.cholesky(np.eye(d) - explained @ crossed.T))
     return np.hstack([np.zeros((d, 6)), white, -white @ explained])
 

@@ -33,8 +33,9 @@ from numpy.typing import NDArray
 from gfimu.array.array import AccelerometerArray
 from gfimu.base.errors import InputError
 from gfimu.base.short_repr import short_repr
+from gfimu.rate.channel_sets import ChannelSets
 from gfimu.rate.health.policy import MonitorPolicy
-from gfimu.rate.sensing import ChannelTables, SensorErrors
+from gfimu.rate.sensing import SensorErrors
 
 __all__ = ["DetectableFaults", "detectable_faults", "least_fault"]
 
@@ -104,10 +105,10 @@ def detectable_faults(
     if not (np.isfinite(sample_rate) and sample_rate > 0 and np.isfinite(duration) and duration > 0):
         raise InputError(f"sample rate {sample_rate} Hz and duration {duration} s must be positive")
     policy = policy or MonitorPolicy()
-    tables = ChannelTables(array, errors)
-    null = tables.null_rows[0]  # (d, c)
-    if unknown_rate and tables.n_null:
-        left, strengths, _ = np.linalg.svd(tables.null_sensitivity[0] / array.length_unit)
+    full = ChannelSets(array, errors.noise_std).full
+    null = full.null_rows  # (d, c)
+    if unknown_rate and full.nulls:
+        left, strengths, _ = np.linalg.svd(full.null_sensitivity / array.length_unit)
         rank = int(np.sum(strengths > _RANK * max(1e-300, strengths.max(initial=0.0))))
         null = left[:, rank:].T @ null
     samples = max(1.0, duration * sample_rate)
@@ -132,7 +133,7 @@ def detectable_faults(
     rivals = tuple(array.channels[int(np.argmax(row))] if row.any() else "" for row in square)
     return DetectableFaults(
         tuple(array.channels), detected, isolated, rivals,
-        np.linalg.norm(tables.alpha_rows[0], axis=0),
+        np.linalg.norm(full.alpha_rows, axis=0),
     )  # fmt: skip
 
 

@@ -44,7 +44,7 @@ def behaves(
         return False
     array, state = follower.array, follower.state
     row = prediction_row(array, channel, watched)
-    residual = (blocks.means - state.bias) @ row - omega_products(omega) @ (row @ array.centripetal_matrix)
+    residual = (blocks.means - state.x[3:]) @ row - omega_products(omega) @ (row @ array.centripetal_matrix)
     noise = float(np.sum(row**2 * follower.errors.noise_std**2))
     bias = float(row @ state.covariance[3:, 3:] @ row) + follower.model_errors()[channel] ** 2
     second = max(1, round(1.0 / follower.block_s))

@@ -98,7 +98,7 @@ def agree(
     """
     per_second = max(1, round(1.0 / follower.block_s))
     count = len(blocks) // per_second
-    freedom = follower.tables.n_null * per_second
+    freedom = follower.sets.full.nulls * per_second
     if count == 0 or freedom == 0:
         return True
     nis = innovations[: count * per_second].reshape(count, per_second).mean(axis=1)

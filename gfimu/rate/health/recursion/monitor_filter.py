@@ -6,13 +6,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gfimu.array.array import AccelerometerArray
+from gfimu.rate.channel_sets import ChannelSets
 from gfimu.rate.health.policy import MonitorPolicy
 from gfimu.rate.health.recursion.blocks import Blocks
 from gfimu.rate.health.recursion.isolation import deflate, strongest
 from gfimu.rate.health.recursion.state import MonitorState, MonitorTables, MonitorTuning
 from gfimu.rate.health.recursion.steps import advance, model_errors
 from gfimu.rate.health.recursion.turning import turning_of
-from gfimu.rate.sensing import ChannelTables, SensorErrors
+from gfimu.rate.sensing import SensorErrors
 
 __all__ = ["MonitorFilter"]
 
@@ -56,7 +57,7 @@ class MonitorFilter:
         self.array, self.errors = array, errors
         self.samples = policy.samples(period)
         self.block_s = self.samples * period
-        self.tables = ChannelTables(array, errors)
+        self.sets = ChannelSets(array, errors.noise_std)
         c, slots = array.n_channels, policy.slots + 1  # one may be held beside the others
         self.threshold = policy.threshold(c, self.block_s)
         self._tuning = MonitorTuning(
@@ -79,8 +80,7 @@ class MonitorFilter:
         covariance[range(3, 3 + c), range(3, 3 + c)] = np.maximum(errors.bias_std, policy.bias_std) ** 2
         self.history = int(2.0 * self._tuning.oldest) + policy.margin + 1
         self.state = MonitorState(
-            omega=np.array(omega0, dtype=float),
-            bias=np.zeros(c),
+            x=np.concatenate([np.asarray(omega0, dtype=float), np.zeros(c)]),
             covariance=covariance,
             last=np.zeros(c),
             low=np.zeros(c),
@@ -93,8 +93,7 @@ class MonitorFilter:
             score=np.zeros((slots, c)),
             started=np.zeros(1, dtype=np.bool_),
             largest=np.zeros(1),
-            past_rate=np.zeros((self.history, 3)),
-            past_bias=np.zeros((self.history, c)),
+            past_x=np.zeros((self.history, 3 + c)),
             past_covariance=np.zeros((self.history, 3 + c, 3 + c)),
             past_means=np.zeros((self.history, 3, c)),
         )
@@ -111,8 +110,7 @@ class MonitorFilter:
 
     def null_rows(self, watched: NDArray[np.bool_]) -> NDArray[np.float64]:
         """Return the whitened null space of these channels, shape (d, c)."""
-        place = self.tables.index(_bits(~watched))  # may add a set to the tables
-        return np.asarray(self.tables.null_rows[place])
+        return self.sets.sets[self.sets.index(watched)].null_rows
 
     def advance(
         self,
@@ -190,7 +188,7 @@ class MonitorFilter:
             state, blocks, everything, watched, tuning, base=base or 0,
             levels=np.ones(count), omega=np.empty((count, 3)), std=np.empty((count, 3)), nis=nis,
         )  # fmt: skip
-        counts = self.tables.null_count[self._sets(blocks, watched, everything)]
+        counts = self._tables().null_count[self._places(blocks, watched, everything)]
         return np.asarray(nis / np.maximum(counts, 1))
 
     def reckon_with(self, errors: SensorErrors) -> None:
@@ -296,37 +294,36 @@ class MonitorFilter:
         """
         times = blocks.t[rows]
         before = blocks.t[rows.start - 1] if rows.start else blocks.t[0] - self.block_s
-        sets = self._sets(blocks, watched, slice(max(rows.start - 1, 0), rows.stop))
-        turning = turning_of(blocks, rows, self.tables.alpha_rows, sets, self.block_s / self.samples)
+        sets = self._places(blocks, watched, slice(max(rows.start - 1, 0), rows.stop))
+        tables = self._tables()
+        turning = turning_of(blocks, rows, tables.alpha, sets, self.block_s / self.samples)
         sets = sets[len(sets) - len(times) :]
         looked_at = watched if suspects is None else suspects
         try:
             place, slot = advance(
-                self._compiled_tables(), tuning, state, blocks.means[rows], turning, np.diff(times, prepend=before),
+                tables, tuning, state, blocks.means[rows], turning, np.diff(times, prepend=before),
                 sets, arrays["levels"], looked_at, arrays["omega"], arrays["std"], arrays["nis"], base + rows.start,
             )  # fmt: skip
         except np.linalg.LinAlgError:  # the filter ran away
-            state.omega[:] = np.nan
+            state.x[:3] = np.nan
             return len(times), -1
         return int(place), int(slot)
 
-    def _sets(self, blocks: Blocks, watched: NDArray[np.bool_], rows: slice) -> NDArray[np.int64]:
-        """Return the set of channels of each block in ``rows``, in the tables."""
-        bits = np.int64(1) << np.arange(self.array.n_channels, dtype=np.int64)
-        masks = ((blocks.missing[rows] | ~watched) * bits).sum(axis=1)
-        unique, inverse = np.unique(masks, return_inverse=True)
-        return np.array([self.tables.index(int(mask)) for mask in unique], dtype=np.int64)[inverse]
+    def _places(self, blocks: Blocks, watched: NDArray[np.bool_], rows: slice) -> NDArray[np.int64]:
+        """Return the set of channels of each block in ``rows``."""
+        return self.sets.indices(~blocks.missing[rows] & watched)
 
-    def _compiled_tables(self) -> MonitorTables:
-        tables = self.tables
+    def _tables(self) -> MonitorTables:
+        """Return the matrices of the sets met so far."""
+        sets = self.sets.sets
         return MonitorTables(
-            tables.alpha_rows, tables.alpha_leak, tables.null_rows, tables.null_sensitivity,
-            tables.null_count, tables.alpha_noise,
-        )  # fmt: skip
-
-
-def _bits(channels: NDArray[np.bool_]) -> int:
-    return sum(1 << int(channel) for channel in np.flatnonzero(channels))
+            np.stack([one.alpha_rows for one in sets]),
+            np.stack([one.leak for one in sets]),
+            np.stack([one.null_rows for one in sets]),
+            np.stack([one.null_sensitivity for one in sets]),
+            np.array([one.nulls for one in sets]),
+            np.stack([one.alpha_noise for one in sets]),
+        )
 
 
 def _span(state: MonitorState, slot: int) -> int:
@@ -335,5 +332,5 @@ def _span(state: MonitorState, slot: int) -> int:
 
 def _lost(state: MonitorState) -> bool:
     used = state.ages >= 1.0
-    parts = (state.omega, state.score[used], state.information[used])
+    parts = (state.x[:3], state.score[used], state.information[used])
     return not all(np.all(np.abs(part) < _RAN_AWAY) for part in parts)  # NaN is not smaller either

@@ -123,17 +123,12 @@ def carry_signatures(tables, state, transition, step, place):  # type: ignore[no
             continue
         for a in range(3):
             for i in range(c):
-                moved[a, i] = g[a, i] + step * alpha_rows[a, i]
-            for j in range(c):
-                weight = step * alpha_rows[a, j]
+                moved[a, i] = step * alpha_rows[a, i]
+            for j in range(3 + c):
+                weight = transition[a, j]
                 if weight != 0.0:
                     for i in range(c):
-                        moved[a, i] -= weight * g[3 + j, i]
-            for b in range(3):
-                weight = transition[a, b]
-                if weight != 0.0:
-                    for i in range(c):
-                        moved[a, i] += weight * g[b, i]
+                        moved[a, i] += weight * g[j, i]
         for a in range(3):
             for i in range(c):
                 g[a, i] = moved[a, i]

@@ -11,7 +11,7 @@ __all__ = ["MonitorState", "MonitorTables", "MonitorTuning"]
 
 
 class MonitorTables(NamedTuple):
-    """Matrices per set of channels (`gfimu.rate.sensing.ChannelTables`), stacked."""
+    """Matrices per set of channels (`gfimu.rate.channel_sets.ChannelSets`), stacked."""
 
     alpha: NDArray[np.float64]  # (sets, 3, c)
     leak: NDArray[np.float64]  # (sets, 3, 6)
@@ -42,8 +42,7 @@ class MonitorTuning(NamedTuple):
 class MonitorState(NamedTuple):
     """What is carried from one block to the next."""
 
-    omega: NDArray[np.float64]  # (3,)
-    bias: NDArray[np.float64]  # (c,)
+    x: NDArray[np.float64]  # (3 + c,) ω, biases
     covariance: NDArray[np.float64]  # (3 + c, 3 + c)
     last: NDArray[np.float64]  # (c,) mean readings of the block before
     low: NDArray[np.float64]  # (c,) range of the readings
@@ -56,8 +55,7 @@ class MonitorState(NamedTuple):
     leading: NDArray[np.int64]  # (1,) slot that showed far more than the others in the last block; −1: none
     held: NDArray[np.int64]  # (1,) slot that is kept beside the others for that; −1: none
     largest: NDArray[np.float64]  # (1,) statistic of a channel so far, beyond what model errors explain
-    past_rate: NDArray[np.float64]  # (h, 3) before each of the last blocks, rings; block k at k mod h
-    past_bias: NDArray[np.float64]  # (h, c)
+    past_x: NDArray[np.float64]  # (h, 3 + c) before each of the last blocks, rings; block k at k mod h
     past_covariance: NDArray[np.float64]  # (h, 3 + c, 3 + c)
     past_means: NDArray[np.float64]  # (h, 3, c) last mean readings, low, high
 
@@ -72,9 +70,8 @@ class MonitorState(NamedTuple):
 
     def go_back(self, block: int) -> None:
         """Return to the state before a block; it must be one of the last h."""
-        place = block % len(self.past_rate)
-        self.omega[:] = self.past_rate[place]
-        self.bias[:] = self.past_bias[place]
+        place = block % len(self.past_x)
+        self.x[:] = self.past_x[place]
         self.covariance[:] = self.past_covariance[place]
         self.last[:], self.low[:], self.high[:] = self.past_means[place]
         self.forget_onsets()

@@ -29,10 +29,10 @@ from numba import njit
 
 from gfimu.base.compiled import INNER, compiled
 from gfimu.rate.health.recursion.signatures import carry_signatures, forget_onsets, new_slot, strongest_slot
+from gfimu.rate.kernel import measure, predict
+from gfimu.rate.probable_rate import slope_of
 
 __all__ = ["advance", "model_errors"]
-
-_TINY = 1e-14  # numerical: least variance kept on the diagonal of the covariance
 
 
 @compiled
@@ -56,13 +56,13 @@ def advance(tables, tuning, state, means, turning, steps, sets, levels, watched,
         _keep(state, base + k)
         place = sets[k]
         level = levels[k]
-        transition = np.zeros((3, 3))
+        transition = np.zeros((3, len(state.x)))
         _follow_range(state, means[k], tuning.forget)
         step = steps[k] + pending
         if tables.null_count[place] < 0:  # too few channels: a gap
             pending = step
             for a in range(3):
-                omega[k, a] = state.omega[a]
+                omega[k, a] = state.x[a]
                 std[k, a] = np.inf
             forget_onsets(state)
             k += 1
@@ -80,7 +80,7 @@ def advance(tables, tuning, state, means, turning, steps, sets, levels, watched,
             carry_signatures(tables, state, transition, step, place)
         nis[k] = _update(tables, tuning, state, means[k], turning[k], place, level)
         for a in range(3):
-            omega[k, a] = state.omega[a]
+            omega[k, a] = state.x[a]
             std[k, a] = np.sqrt(max(state.covariance[a, a], 0.0))
         for i in range(len(state.last)):
             state.last[i] = means[k, i]
@@ -98,7 +98,7 @@ def model_errors(state, tuning, std):  # type: ignore[no-untyped-def]
     """Fill in how large a constant fault the errors of gain, axes and position resemble on each channel, m/s²."""
     square = 0.0
     for a in range(3):
-        square += state.omega[a] * state.omega[a]
+        square += state.x[a] * state.x[a]
     for i in range(len(std)):
         gain = tuning.range_share * tuning.scale_std * (state.high[i] - state.low[i])
         place = tuning.placement_std * square
@@ -108,15 +108,13 @@ def model_errors(state, tuning, std):  # type: ignore[no-untyped-def]
 @njit(**INNER)
 def _keep(state, block):  # type: ignore[no-untyped-def]
     """Keep the state before a block: number by number, as slices take ten times as long to compile."""
-    place = block % len(state.past_rate)
-    for a in range(3):
-        state.past_rate[place, a] = state.omega[a]
-    for i in range(len(state.bias)):
-        state.past_bias[place, i] = state.bias[i]
+    place = block % len(state.past_x)
+    for i in range(len(state.last)):
         state.past_means[place, 0, i] = state.last[i]
         state.past_means[place, 1, i] = state.low[i]
         state.past_means[place, 2, i] = state.high[i]
-    for r in range(len(state.covariance)):
+    for r in range(len(state.x)):
+        state.past_x[place, r] = state.x[r]
         for q in range(len(state.covariance)):
             state.past_covariance[place, r, q] = state.covariance[r, q]
 
@@ -138,77 +136,54 @@ def _products(w):  # type: ignore[no-untyped-def]
 
 
 @njit(**INNER)
-def _slope(row, w, out):  # type: ignore[no-untyped-def]
-    """Fill in the derivative of ``row`` s(ω) by ω."""
-    out[0] = 2.0 * w[0] * row[0] + w[1] * row[3] + w[2] * row[4]
-    out[1] = 2.0 * w[1] * row[1] + w[0] * row[3] + w[2] * row[5]
-    out[2] = 2.0 * w[2] * row[2] + w[0] * row[4] + w[1] * row[5]
-
-
-@njit(**INNER)
 def _predict(tables, tuning, state, mean, turning, step, place, level, transition):  # type: ignore[no-untyped-def]
-    """Carry state and covariance over to the next block, (1); ``transition`` becomes Φ_ω − 1."""
-    alpha_rows = tables.alpha[place]
+    """Carry state and covariance over to the next block, (1); ``transition`` (3, 3 + c) becomes that of ω."""
     leak = tables.leak[place]
-    c = len(mean)
-    n = 3 + c
-    p = state.covariance
-    alpha = np.zeros(3)
+    x, c = state.x, len(mean)
+    alpha, added, noise, slope = np.zeros(3), np.zeros(3), np.zeros((3, 3)), np.zeros(3)
+    middle = np.zeros(3)
     for a in range(3):
         alpha[a] = turning[a]
+        middle[a] = x[a]
+        transition[a, a] = 1.0
         for i in range(c):
-            alpha[a] -= alpha_rows[a, i] * state.bias[i]
+            transition[a, 3 + i] = -step * tables.alpha[place, a, i]
+            alpha[a] -= tables.alpha[place, a, i] * x[3 + i]
     leaky = False
     for a in range(3):
         for j in range(6):
             leaky = leaky or leak[a, j] != 0.0
     if leaky:  # products of ω remain in α: implicit midpoint
-        middle = state.omega.copy()
-        for _ in range(3):
+        left = np.zeros(3)
+        for turn in range(4):
             s = _products(middle)
             for a in range(3):
-                total = alpha[a]
+                left[a] = alpha[a]
                 for j in range(6):
-                    total -= leak[a, j] * s[j]
-                middle[a] = state.omega[a] + 0.5 * step * total
-        s = _products(middle)
-        slope = np.zeros(3)
+                    left[a] -= leak[a, j] * s[j]
+            if turn < 3:
+                for a in range(3):
+                    middle[a] = x[a] + 0.5 * step * left[a]
         for a in range(3):
-            for j in range(6):
-                alpha[a] -= leak[a, j] * s[j]
-            _slope(leak[a], middle, slope)
+            alpha[a] = left[a]
+            slope_of(leak[a], middle, slope)
             for b in range(3):
-                transition[a, b] = -step * slope[b]
-    rows = np.zeros((3, n))  # of F P, F = [1 + transition, −T A; 0, 1]
+                transition[a, b] -= step * slope[b]
+    size = 0.0
     for a in range(3):
-        state.omega[a] += step * alpha[a]
-        for m in range(n):
-            total = p[a, m]
-            for b in range(3):
-                total += transition[a, b] * p[b, m]
-            for i in range(c):
-                total -= step * alpha_rows[a, i] * p[3 + i, m]
-            rows[a, m] = total
+        size += alpha[a] * alpha[a]
     for a in range(3):
+        added[a] = x[a] + step * alpha[a]
+        for j in range(3 + c):
+            added[a] -= transition[a, j] * x[j]
         for b in range(3):
-            total = rows[a, b]
-            for m in range(3):
-                total += rows[a, m] * transition[b, m]
-            for i in range(c):
-                total -= rows[a, 3 + i] * step * alpha_rows[b, i]
-            p[a, b] = total + level * step * step * tables.noise[place, a, b] / tuning.samples
-        for i in range(c):
-            p[a, 3 + i] = rows[a, 3 + i]
-            p[3 + i, a] = rows[a, 3 + i]
-    if step > 1.5 * tuning.period:  # a gap, over which α is unknown but for its size
-        size = 0.0
-        for a in range(3):
-            size += alpha[a] * alpha[a]
-        for a in range(3):
-            p[a, a] += (size + 1.0) * step * step
+            noise[a, b] = level * step * step * tables.noise[place, a, b] / tuning.samples
+        if step > 1.5 * tuning.period:  # a gap, over which α is unknown but for its size
+            noise[a, a] += (size + 1.0) * step * step
+    predict(x, state.covariance, transition, added, noise, np.zeros((3, 4 + c)))
     for i in range(c):
         change = abs(mean[i] - state.last[i]) * (state.high[i] - state.low[i])
-        p[3 + i, 3 + i] += tuning.walk * step + 0.5 * tuning.scale_std * tuning.scale_std * change
+        state.covariance[3 + i, 3 + i] += tuning.walk * step + 0.5 * tuning.scale_std * tuning.scale_std * change
 
 
 @njit(**INNER)
@@ -235,53 +210,32 @@ def _update(tables, tuning, state, mean, turning, place, level):  # type: ignore
     """Measure the null space row by row, (2), with all signatures, (3); returns the normalised innovation squared."""
     c = len(mean)
     n = 3 + c
-    p = state.covariance
-    before = state.omega.copy()
+    x, p = state.x, state.covariance
+    before = x.copy()
     average = np.empty(3)  # ω over the block
     for a in range(3):
         average[a] = before[a] + turning[3 + a]
     products = _products(average)
     _spread_within(products, turning, tables.leak[place], tuning)
-    noise = level / tuning.samples
-    h = np.zeros(n)
-    ph = np.zeros(n)
+    h, gain = np.zeros(n), np.zeros(n)
     slope = np.zeros(3)
     hg = np.zeros(c)
     total = 0.0
     for j in range(tables.null_count[place]):
         z_row = tables.null[place, j]
         m_row = tables.sensitivity[place, j]
-        _slope(m_row, average, slope)
+        slope_of(m_row, average, slope)
         innovation = 0.0
         for a in range(6):
             innovation -= m_row[a] * products[a]
         for a in range(3):
             h[a] = slope[a]
-            innovation -= slope[a] * (state.omega[a] - before[a])
+            innovation -= slope[a] * (x[a] - before[a])
         for i in range(c):
             h[3 + i] = z_row[i]
-            innovation += z_row[i] * (mean[i] - state.bias[i])
-        variance = noise
-        for m in range(n):
-            value = 0.0
-            for q in range(n):
-                value += p[m, q] * h[q]
-            ph[m] = value
-        for m in range(n):
-            variance += h[m] * ph[m]
-        inverse = 1.0 / variance
+            innovation += z_row[i] * (mean[i] - x[3 + i])
+        inverse = measure(x, p, h, innovation, level / tuning.samples, n, gain)
         total += innovation * innovation * inverse
-        for m in range(n):
-            gain = ph[m] * inverse
-            if m < 3:
-                state.omega[m] += gain * innovation
-            else:
-                state.bias[m - 3] += gain * innovation
-            for q in range(m + 1):
-                value = p[m, q] - gain * ph[q]
-                p[m, q] = value
-                p[q, m] = value
-            p[m, m] = max(p[m, m], _TINY)
         for s in range(len(state.ages)):
             if state.ages[s] == 0.0:
                 continue
@@ -294,7 +248,7 @@ def _update(tables, tuning, state, mean, turning, place, level):  # type: ignore
                     for i in range(c):
                         hg[i] -= weight * g[m, i]
             for m in range(n):
-                weight = ph[m] * inverse
+                weight = gain[m]
                 if weight != 0.0:
                     for i in range(c):
                         g[m, i] += weight * hg[i]
