@@ -119,17 +119,34 @@ def watched_readings(
     errors = SensorErrors.from_parts(array, rate, step=step_of_readings(readings), noise_std=noise)
     if errors.stuck_after == 0:  # steps coarser than the noise: rounding errors last, and look like faults
         return used
-    health = None
-    if watch:
-        from gfimu.rate.health.watch import watch_from_rest, watch_in_motion
-
-        if not calibrated:
-            errors = errors.with_part_gains(array)
-        if omega0 is None or not omega0.any():
-            health = watch_from_rest(array, used.t_s, readings, errors)
-        health = health or watch_in_motion(array, used.t_s, readings, errors, omega0=omega0)
     stuck = stuck_readings(readings, errors.stuck_after)
-    return replace(used, stuck=stuck, stuck_after=errors.stuck_after, watch=health)
+    found = replace(used, stuck=stuck, stuck_after=errors.stuck_after)
+    if not watch:
+        return found
+    if calibrated:
+        return replace(found, watch=_watched(array, used.t_s, readings, errors, omega0))
+    from gfimu.rate.health.gains import with_learnt_gains
+
+    errors = errors.with_part_gains(array)
+    first = replace(found, watch=_watched(array, used.t_s, readings, errors, omega0))
+    corrected, left = with_learnt_gains(array, used.t_s, readings, errors, faulty=first.excluded | stuck)
+    if left is errors:
+        return first
+    return replace(found, watch=_watched(array, used.t_s, corrected, left, omega0))
+
+
+def _watched(
+    array: AccelerometerArray,
+    t: NDArray[np.float64],
+    readings: NDArray[np.float64],
+    errors: SensorErrors,
+    omega0: NDArray[np.float64] | None,
+) -> ChannelHealth | None:
+    """Return which channels contradict the others, from a first rest or from a start in motion."""
+    from gfimu.rate.health.watch import watch_from_rest, watch_in_motion
+
+    health = watch_from_rest(array, t, readings, errors) if omega0 is None or not omega0.any() else None
+    return health or watch_in_motion(array, t, readings, errors, omega0=omega0)
 
 
 def _stuck_fault(name: str, onset: float, found: float, end: float) -> ChannelFault:

@@ -657,6 +657,24 @@ class LiveRateFilter:
         features = features_of(self.array, readings, np.ones(self.array.n_channels, dtype=np.bool_)).mean(axis=0)
         return considered.of_rows(self.sets.rows(), features[None])[0]
 
+    def channel_errors(self, readings: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+        """Return what the errors of the channels, as known now, make of the readings (n, c), m/s², and what is left.
+
+        What is left of all stated errors is a gain error of each channel by itself that would move the null space, with
+        its parity rows, as much. Errors that only parity rows show are not estimated, and left whole.
+        """
+        considered, rows = self._reduction.considered, self.sets.full.null_rows
+        errors = slice(self.tuning.at.errors, self.tuning.at.end)
+        values, spread = self.carried[0].x[errors], self.carried[0].covariance[errors, errors]
+        motion = self._reduction.smooth_motion(self._samples)
+        shown = np.einsum("q,qcf,nf->nc", values, considered.patterns, motion, optimize=True)
+        moments = np.cov(motion.T, bias=True)
+        seen = rows @ considered.patterns  # (q, d, 12)
+        learnt = np.einsum("qdf,fg,rdg,qr->", seen, moments, seen, np.eye(len(values)) - spread, optimize=True)
+        moved = np.trace(self._stated_errors.covariance_of(rows, moments)) - learnt
+        stated = float(np.sum(rows**2 @ np.nanvar(readings, axis=0)))
+        return shown, float(np.sqrt(max(moved, 0.0) / stated)) if stated > 0.0 else np.inf
+
     def _learnt(self, prior: NDArray[np.float64], readings: NDArray[np.float64]) -> Constants:
         """Return the constants after complete readings (n, c) at rest.
 

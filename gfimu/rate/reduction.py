@@ -11,7 +11,7 @@ from gfimu.rate.filter_state import Samples
 from gfimu.rate.result import ChannelReport
 from gfimu.rate.sensing import SensorErrors
 
-__all__ = ["Reduction", "stuck_readings"]
+__all__ = ["Reduction", "equal_since", "stuck_readings"]
 
 _GAP = 1.5  # periods from which on a step is a gap
 _NEIGHBOURS = np.array([-3.0, 12.0, 12.0, -3.0]) / 18.0  # a parabola's value between two samples on either side
@@ -149,20 +149,11 @@ class Reduction:
         return samples
 
     def add_errors(self, samples: Samples, first: int) -> None:
-        """Fill in what the errors of the channels make of the samples from ``first`` on.
-
-        The motion for the null space is taken from the neighbours of a sample, by the parabola through two on either
-        side, as its own noise would look like an error of a gain.
-        """
+        """Fill in what the errors of the channels make of the samples from ``first`` on."""
         if not len(self.considered):
             return
-        features, n = samples.features, len(samples.t)
-        rows = np.arange(first, n)
-        around = rows[:, None] + np.array([-2, -1, 1, 2])  # (n, 4)
-        whole = (around >= 0).all(axis=1) & (around < n).all(axis=1)
-        whole &= np.ptp(samples.t[np.clip(around, 0, n - 1)], axis=1) < 2.0 * (1.0 + _GAP) * self._period
-        motion = features[first:].copy()
-        motion[whole] = np.einsum("i,nif->nf", _NEIGHBOURS, features[around[whole]])
+        features, rows = samples.features, np.arange(first, len(samples.t))
+        motion = self.smooth_motion(samples, first)
         for place in np.unique(samples.channel_set[first:]):
             if place >= 0:
                 here = samples.channel_set[first:] == place
@@ -170,6 +161,19 @@ class Reduction:
                 samples.alpha_errors[rows[here]] = self.considered.of_rows(channels.alpha_rows, features[first:][here])
                 samples.force_errors[rows[here]] = self.considered.of_rows(channels.force_rows, features[first:][here])
                 samples.product_errors[rows[here]] = self.considered.of_rows(channels.product_rows, motion[here])
+
+    def smooth_motion(self, samples: Samples, first: int = 0) -> NDArray[np.float64]:
+        """Return the features (n, 12) of the motion from sample ``first`` on, by the neighbours of each sample.
+
+        The parabola through two on either side is taken, because a sample's own noise looks like an error of a gain.
+        """
+        features, n = samples.features, len(samples.t)
+        around = np.arange(first, n)[:, None] + np.array([-2, -1, 1, 2])  # (n, 4)
+        whole = (around >= 0).all(axis=1) & (around < n).all(axis=1)
+        whole &= np.ptp(samples.t[np.clip(around, 0, n - 1)], axis=1) < 2.0 * (1.0 + _GAP) * self._period
+        motion = features[first:].copy()
+        motion[whole] = np.einsum("i,nif->nf", _NEIGHBOURS, features[around[whole]])
+        return motion
 
     def _add_timing(
         self,
@@ -211,8 +215,12 @@ def stuck_readings(readings: NDArray[np.float64], after: int) -> NDArray[np.bool
     """Mark readings (n, c) from the ``after``-th equal one in a row on; none where ``after`` is below 2."""
     if after < 2:
         return np.zeros(readings.shape, dtype=np.bool_)
-    rows = np.arange(len(readings))[:, None]
+    return np.asarray(np.arange(len(readings))[:, None] - equal_since(readings) + 1 >= after)
+
+
+def equal_since(readings: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Return the row of the first of the equal readings in a row that each of (n, c) is one of, shape (n, c)."""
     new = np.ones(readings.shape, dtype=np.bool_)
     new[1:] = readings[1:] != readings[:-1]  # NaN differs from all
-    first = np.maximum.accumulate(np.where(new, rows, 0), axis=0)  # (n, c), row of the first equal reading
-    return np.asarray(rows - first + 1 >= after)
+    rows = np.arange(len(readings))[:, None]
+    return np.asarray(np.maximum.accumulate(np.where(new, rows, 0), axis=0))
