@@ -125,13 +125,14 @@ def watched_readings(
         return found
     if calibrated:
         return replace(found, watch=_watched(array, used.t_s, readings, errors, omega0))
-    from gfimu.rate.health.gains import with_learnt_gains
+    from gfimu.rate.health.gains import gross_faults, with_learnt_gains
 
     errors = errors.with_part_gains(array)
-    first = replace(found, watch=_watched(array, used.t_s, readings, errors, omega0))
-    corrected, left = with_learnt_gains(array, used.t_s, readings, errors, faulty=first.excluded | stuck)
+    first = _watched(array, used.t_s, readings, errors, omega0)
+    bent = stuck if first is None else stuck | gross_faults(first, array, used.t_s, readings, errors)
+    corrected, left = with_learnt_gains(array, used.t_s, readings, errors, bent)
     if left is errors:
-        return first
+        return replace(found, watch=first)
     return replace(found, watch=_watched(array, used.t_s, corrected, left, omega0))
 
 

@@ -661,11 +661,14 @@ class LiveRateFilter:
         """Return what the errors of the channels, as known now, make of the readings (n, c), m/s², and what is left.
 
         What is left of all stated errors is a gain error of each channel by itself that would move the null space, with
-        its parity rows, as much. Errors that only parity rows show are not estimated, and left whole.
+        its parity rows, as much. Errors that only parity rows show are not estimated, and left whole. A sample that was
+        left out has the motion of these readings.
         """
         considered, rows = self._reduction.considered, self.sets.full.null_rows
         errors = slice(self.tuning.at.errors, self.tuning.at.end)
         values, spread = self.carried[0].x[errors], self.carried[0].covariance[errors, errors]
+        blind = (self._samples.channel_set < 0) & np.isfinite(readings).all(axis=1)
+        self._samples.features[blind] = features_of(self.array, readings[blind], np.ones(readings.shape[1], dtype=bool))
         motion = self._reduction.smooth_motion(self._samples)
         shown = np.einsum("q,qcf,nf->nc", values, considered.patterns, motion, optimize=True)
         moments = np.cov(motion.T, bias=True)

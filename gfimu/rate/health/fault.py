@@ -52,7 +52,7 @@ class FaultEntry(Declared):
 class ChannelFault(Declared):
     """One fault with all channels that it is on: what is wrong, since when, and how surely.
 
-    Of a fault that is not isolated all alternatives are left out if the others still see all six motions, else none.
+    Of a fault that is not isolated all alternatives are left out if the others can still check each other, else none.
     """
 
     channels: Annotated[tuple[str, ...], figure("The channels; where it is not isolated, all that may be at fault.")]

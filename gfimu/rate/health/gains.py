@@ -8,11 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.array.array import AccelerometerArray
+from gfimu.rate.health.fault import ChannelHealth
 from gfimu.rate.live import LiveRateFilter
 from gfimu.rate.reduction import equal_since
 from gfimu.rate.sensing import SensorErrors
 
-__all__ = ["with_learnt_gains"]
+__all__ = ["gross_faults", "with_learnt_gains"]
+
+_GROSS = 3.0  # standard deviations of what errors of gains make of the largest reading, that a gross fault exceeds
 
 
 def with_learnt_gains(
@@ -20,18 +23,18 @@ def with_learnt_gains(
     t: NDArray[np.float64],
     readings: NDArray[np.float64],
     errors: SensorErrors,
-    faulty: NDArray[np.bool_] | None = None,
+    faulty: NDArray[np.bool_],
 ) -> tuple[NDArray[np.float64], SensorErrors]:
     """Return readings (n, c), m/s², without the errors of gains and axes that their motion shows, and what is left.
 
     A fault is a change of one channel at some moment, which the errors of gains, constant over the run, hardly follow.
-    Readings ``faulty`` (n, c), of channels whose faults are seen without that, teach nothing. Readings and errors stay
-    where the run doesn't begin at rest, or its motion shows nothing of the errors.
+    Readings that are ``faulty`` (n, c) teach nothing. Readings and errors stay where the run doesn't begin at rest, or
+    its motion shows nothing of the errors.
     """
     if errors.gain_std == 0.0:
         return readings, errors
     live = LiveRateFilter(array, errors, float(np.median(np.diff(t))))
-    live.run_recording(t, readings if faulty is None else np.where(faulty, np.nan, readings), smooth=False)
+    live.run_recording(t, np.where(faulty, np.nan, readings), smooth=False)
     if live.start is None or live.start.sign_open:
         return readings, errors
     shown, left = live.channel_errors(readings)
@@ -39,3 +42,24 @@ def with_learnt_gains(
         return readings, errors
     held = np.take_along_axis(shown, equal_since(readings), axis=0)  # a channel that is stuck stays so
     return readings - held, replace(errors, scale_std=left, axis_std=0.0)
+
+
+def gross_faults(
+    health: ChannelHealth,
+    array: AccelerometerArray,
+    t: NDArray[np.float64],
+    readings: NDArray[np.float64],
+    errors: SensorErrors,
+) -> NDArray[np.bool_]:
+    """Mark the readings (n, c) of channels during faults that are larger than errors of gains can be.
+
+    Where it is not known which channels are at fault, those of all are marked.
+    """
+    marked = np.zeros(readings.shape, dtype=np.bool_)
+    limits = _GROSS * errors.gain_std * np.nanmax(np.abs(readings), axis=0)
+    for fault in health.faults:
+        columns = np.array([array.channels.index(name) for name in fault.channels])
+        if np.any(np.abs(fault.sizes) > limits[columns]):
+            rows = np.flatnonzero((t >= fault.onset_s) & (t < fault.end_s))
+            marked[np.ix_(rows, columns if fault.isolated else np.arange(array.n_channels))] = True
+    return marked

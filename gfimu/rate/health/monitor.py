@@ -275,7 +275,7 @@ class ChannelMonitor:
             if not alone:
                 sets = tuple(tuple(self.array.channels[i] for i in entry.channels) for entry in rivals)
                 fault = replace(fault, isolated=False, alternatives=sets)
-            if self._may_exclude(blamed, fewest=None if alone else 0):
+            if self._may_exclude(blamed):
                 back, fault = self._since_when(
                     place, self._before(place - self.follower.span(int(used[best.slot]))), fault
                 )

@@ -223,7 +223,10 @@ class MonitorFilter:
         state, _, _ = self._again(blocks, rows, watched, levels, base=base, tuning=self._blind())
         if _lost(state):
             return np.inf
-        _, information, score = self.evidence(state)
+        try:
+            _, information, score = self.evidence(state)
+        except np.linalg.LinAlgError:  # as good as lost
+            return np.inf
         return float(max(strongest(*pair, watched)[1] for pair in zip(information, score, strict=True)))
 
     def first_contradiction(
