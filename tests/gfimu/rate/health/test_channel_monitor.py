@@ -7,6 +7,7 @@ from watched_world import CALIBRATED, CUBE, GRAVITY, RATE_HZ, readings
 from gfimu import InputError, SensorErrors
 from gfimu.rate import HealthCode
 from gfimu.rate.health import MonitorPolicy, watch_channels, watch_from_rest
+from gfimu.rate.health.recursion.blocks import block_means
 from gfimu.rate.health.recursion.monitor_filter import MonitorFilter
 from gfimu.rate.health.recursion.signatures import new_slot
 from gfimu.rate.health.watch import watch_in_motion
@@ -236,3 +237,20 @@ def test_the_onset_that_shows_far_more_than_the_others_is_not_thinned_out():
     assert 2.0 not in state.ages
     assert state.held[0] == -1
     assert np.count_nonzero(state.ages) == 8
+
+
+def test_a_trial_whose_evidence_can_not_be_solved_is_lost_and_no_crash(monkeypatch):
+    """A filter of too few channels diverges until the information on faults has no inverse."""
+    period = 1.0 / RATE_HZ
+    follower = MonitorFilter(CUBE, CALIBRATED, period, omega0=np.zeros(3), omega0_std=1e-3, policy=MonitorPolicy())
+    t, values, _ = readings("turn", 1, duration=2.0)
+    blocks = block_means(t, values, CALIBRATED.limits, follower.samples)
+    watched = np.ones(12, dtype=bool)
+    arguments = (blocks, slice(0, len(blocks)), watched, np.ones(len(blocks)))
+    assert follower.unexplained_without(*arguments, base=0) < 30.0
+
+    def unsolvable(*_):
+        raise np.linalg.LinAlgError("not positive definite")
+
+    monkeypatch.setattr("gfimu.rate.health.recursion.monitor_filter.deflate", unsolvable)
+    assert follower.unexplained_without(*arguments, base=0) == np.inf
