@@ -28,7 +28,8 @@ from sim.simulation import simulate
 RATE = 100.0
 DRIFT_TIME = 30.0
 CUBE = AccelerometerArray.load("cube12")
-COLOURS = dict(zip(RATE_METHODS, ("0.45", "tab:green", "tab:olive", "tab:orange", "tab:blue"), strict=True))
+SHADES = ("0.45", "tab:green", "tab:olive", "tab:orange", "tab:blue", "tab:purple")
+COLOURS = dict(zip(RATE_METHODS, SHADES, strict=True))
 
 
 def steady_error(speed: float, noise: float, seed: int) -> dict[str, float]:

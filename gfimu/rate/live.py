@@ -665,6 +665,8 @@ class LiveRateFilter:
         left out has the motion of these readings.
         """
         considered, rows = self._reduction.considered, self.sets.full.null_rows
+        if not len(considered):
+            return np.zeros(readings.shape), np.inf
         errors = slice(self.tuning.at.errors, self.tuning.at.end)
         values, spread = self.carried[0].x[errors], self.carried[0].covariance[errors, errors]
         blind = (self._samples.channel_set < 0) & np.isfinite(readings).all(axis=1)
@@ -675,7 +677,7 @@ class LiveRateFilter:
         seen = rows @ considered.patterns  # (q, d, 12)
         learnt = np.einsum("qdf,fg,rdg,qr->", seen, moments, seen, np.eye(len(values)) - spread, optimize=True)
         moved = np.trace(self._stated_errors.covariance_of(rows, moments)) - learnt
-        stated = float(np.sum(rows**2 @ np.nanvar(readings, axis=0)))
+        stated = float(np.sum(rows**2 @ np.ma.masked_invalid(readings).var(axis=0).filled(0.0)))
         return shown, float(np.sqrt(max(moved, 0.0) / stated)) if stated > 0.0 else np.inf
 
     def _learnt(self, prior: NDArray[np.float64], readings: NDArray[np.float64]) -> Constants:

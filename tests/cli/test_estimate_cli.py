@@ -250,13 +250,17 @@ def test_the_first_call_of_the_filter_says_that_it_compiles(monkeypatch):
     from gfimu.commands.known_axis import KnownAxis
     from gfimu.rate import first_call
     from gfimu.rate.body_rate import follow
+    from gfimu.rate.open_loop import integrate_open
 
     def doing(method):
         return _doing({"axis": KnownAxis(), "method": method})
 
-    monkeypatch.setattr(first_call, "must_compile", lambda: True)
+    monkeypatch.setattr(first_call, "must_compile", lambda kernel: kernel is follow)
     assert "compiling" in doing("filter")
     assert "compiling" not in doing("integrate")
+    monkeypatch.setattr(first_call, "must_compile", lambda kernel: kernel is integrate_open)
+    assert "compiling" not in doing("smoother")
+    assert "compiling" in doing("ml")
     monkeypatch.undo()
     if follow.signatures:
         assert not first_call.must_compile()

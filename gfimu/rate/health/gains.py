@@ -56,7 +56,7 @@ def gross_faults(
     Where it is not known which channels are at fault, those of all are marked.
     """
     marked = np.zeros(readings.shape, dtype=np.bool_)
-    limits = _GROSS * errors.gain_std * np.nanmax(np.abs(readings), axis=0)
+    limits = _GROSS * errors.gain_std * np.abs(np.nan_to_num(readings)).max(axis=0)
     for fault in health.faults:
         columns = np.array([array.channels.index(name) for name in fault.channels])
         if np.any(np.abs(fault.sizes) > limits[columns]):
