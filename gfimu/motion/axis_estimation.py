@@ -16,10 +16,12 @@ from gfimu.base.version import __version__
 from gfimu.motion.attitude import from_rotation
 from gfimu.motion.estimate import FORMAT_VERSION, Estimate
 from gfimu.rate.axis.accuracy.bounds import require_visible
+from gfimu.rate.axis.channels import AxisChannels
 from gfimu.rate.axis.fit import fit_axis
 from gfimu.rate.axis.problem import AxisProblem
 from gfimu.rate.axis.recursion import smooth_axis
-from gfimu.rate.rest_test import begins_still
+from gfimu.rate.axis.rest import begins_at_rest
+from gfimu.rate.sensing import SensorErrors
 from gfimu.recording import Recording
 from gfimu.recording.carried_array import array_metadata
 from gfimu.recording.clipping import without_clipped
@@ -51,7 +53,7 @@ def estimate_about_axis(
         The axis, and whether it stands still or moves with a body.
     at_rest : bool
         Whether the body is at rest at the first sample, else the start is searched, and the sign of the rate with it;
-        by default whether the readings of the first half second are still.
+        by default whether the first half second is rest (`gfimu.rate.axis.rest.begins_at_rest`).
     smooth : bool
         Whether later samples are used for earlier ones (Rauch, Tung and Striebel).
     noise_std : array_like, scalar or shape (c,), optional
@@ -78,7 +80,9 @@ def estimate_about_axis(
     noise = white_noise_std(array, recording.sample_rate) if noise_std is None else np.asarray(noise_std, dtype=float)
     noise = np.ascontiguousarray(np.broadcast_to(noise, array.n_channels))
     if at_rest is None:
-        at_rest = begins_still(y, noise, 1.0 / recording.sample_rate)
+        errors = SensorErrors.of_recording(array, recording.metadata, recording.sample_rate)
+        spread = errors.bias_std
+        at_rest = begins_at_rest(y, AxisChannels.of(array, axis), axis, noise, spread, 1.0 / recording.sample_rate)
     fit = fit_axis(t, y, array, axis, noise, at_rest=at_rest)
     one, channels, mounted = fit.settings, fit.channels, fit.mounting
     slopes = None if mounted is None else mounted.mounting.slopes(mounted.values)

@@ -20,7 +20,8 @@ from gfimu.rate.axis.mirror import MirrorTest
 from gfimu.rate.axis.mounting import Mounting
 from gfimu.rate.axis.problem import AxisProblem, Settings
 from gfimu.rate.axis.recursion import filter_axis
-from gfimu.rate.rest_test import begins_still
+from gfimu.rate.axis.rest import begins_at_rest
+from gfimu.rate.sensing import SensorErrors
 from gfimu.rate.stream import LiveSample, SkippedLine, stream_samples
 
 __all__ = ["AxisSample", "LiveAxisFilter", "LiveAxisSettings", "axis_stream"]
@@ -121,7 +122,7 @@ class LiveAxisFilter:
         Nominal sample rate, Hz.
     at_rest : bool
         Whether the body is at rest at the first sample, else both signs of the rate are followed until one is clear;
-        by default whether the readings of the first half second are still.
+        by default whether the first half second is rest (`begins_at_rest`).
 
     Raises
     ------
@@ -184,7 +185,8 @@ class LiveAxisFilter:
         waiting, self._waiting = self._waiting, []
         t, y = np.array([one for one, _ in waiting]), np.array([one for _, one in waiting])
         if self._at_rest is None:
-            self._at_rest = begins_still(y, self._noise, self._period)
+            spread = SensorErrors.from_parts(self.array, 1.0 / self._period).bias_std
+            self._at_rest = begins_at_rest(y, self._channels, self.axis, self._noise, spread, self._period)
             self._sign = "decided" if self._at_rest else "undecided"
         self._numbers, covariance = first_settings(y, self._channels, self.axis, self._noise, at_rest=self._at_rest)
         tilt = self._numbers.inclination

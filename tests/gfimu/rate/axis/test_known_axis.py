@@ -8,9 +8,10 @@ from turning import NOISE, RATE, array_of, turned
 
 import gfimu
 from gfimu import AccelerometerArray, Chip, GeometryError, InputError, TurningAxis
+from gfimu.base import STANDARD_GRAVITY
 from gfimu.motion import estimate_about_axis, to_rotation
-from gfimu.rate import axis_bounds
-from gfimu.recording import mapped_recording
+from gfimu.rate import LiveAxisFilter, axis_bounds
+from gfimu.recording import Recording, mapped_recording
 
 ONE = array_of((0.1, 0.0, 0.02))
 TWO = array_of((0.02, 0.0, 0.0), (0.17, 0.0, 0.0))
@@ -182,3 +183,41 @@ def test_the_array_s_own_axis_is_used_where_it_sees_too_little(tmp_path):
     assert np.sqrt(np.mean((found.omega[1000:, 2] - rate[1000:]) ** 2)) < 0.1
     found.write(tmp_path / "estimate.csv")
     assert gfimu.Estimate.read(tmp_path / "estimate.csv").metadata["turning_axis"]["hub"] == "fixed"
+
+
+def steady(array, speed, rng, *, duration=12.0):
+    """Return a recording of an upright table with sensor biases of 35 mg: steady for 4 s, then faster and back."""
+    t = np.arange(0.0, duration, 1.0 / RATE)
+    bump = np.where(t > 4.0, np.sin(np.pi * (t - 4.0) / 8.0) ** 2, 0.0)
+    rate = speed * (1.0 + bump)
+    alpha = np.gradient(rate, t)
+    columns = []
+    for chip in array.chips:
+        place = chip.position
+        force = np.array([0.0, 0.0, STANDARD_GRAVITY]) + np.outer(alpha, np.cross([0.0, 0.0, 1.0], place))
+        columns.append((force - np.outer(rate**2, [place[0], place[1], 0.0])) @ chip.axes.T)
+    readings = np.hstack(columns) + NOISE * rng.standard_normal((len(t), array.n_channels))
+    readings += 0.035 * STANDARD_GRAVITY * rng.standard_normal(array.n_channels)
+    return Recording.from_arrays(t, readings, array), rate
+
+
+@pytest.mark.parametrize(("array", "axis"), [(ONE, TurningAxis.of("z", inclination=0.0)), (TWO, UPRIGHT)])
+def test_a_steady_spin_from_the_first_sample_is_no_rest(array, axis):
+    recording, rate = steady(array, 8.0, np.random.default_rng(3))
+    found = estimate_about_axis(recording, array, axis)
+    size = np.linalg.norm(found.omega, axis=1)
+    assert np.median(np.abs(size - rate)[:300]) < 1.0  # biases of 0.34 m/s² at 0.1 m of lever
+    live = LiveAxisFilter(array, replace(axis, inclination=0.0), RATE)
+    samples = [one for t, y in zip(recording.t_s, recording.readings, strict=True) for one in live.push(t, y)]
+    assert np.median([abs(one.rate) for one in samples[:300]]) > 5.0
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize(("array", "axis"), [(ONE, TurningAxis.of("z", inclination=0.0)), (TWO, UPRIGHT)])
+def test_a_rest_with_biases_stays_one(array, axis, seed):
+    recording, _ = steady(array, 0.0, np.random.default_rng(seed))
+    found = estimate_about_axis(recording, array, axis)
+    assert (
+        np.abs(found.omega[0]).max() < 0.05
+    )  # later it is bent by biases that it is not told of
+    assert found.metadata["sign"] == "decided"
