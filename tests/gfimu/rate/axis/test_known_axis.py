@@ -217,7 +217,5 @@ def test_a_steady_spin_from_the_first_sample_is_no_rest(array, axis):
 def test_a_rest_with_biases_stays_one(array, axis, seed):
     recording, _ = steady(array, 0.0, np.random.default_rng(seed))
     found = estimate_about_axis(recording, array, axis)
-    assert (
-        np.abs(found.omega[0]).max() < 0.05
-    )  # later it is bent by biases that it is not told of
+    assert np.abs(found.omega[0]).max() < 0.05  # later it is bent by biases that it is not told of
     assert found.metadata["sign"] == "decided"
