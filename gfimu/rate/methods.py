@@ -96,7 +96,8 @@ def estimate_rate(
 
         references = (*references, Reference.gyro(errors).measured(gyro, len(np.atleast_1d(np.asarray(t)))))
     if chosen.recursive:
-        return chosen.solver(array, t, readings, errors, start, references=references, progress=progress, **followed)
+        beside = {"references": references} if references else {}
+        return chosen.solver(array, t, readings, errors, start, progress=progress, **beside, **followed)
     for one in references:
         chosen.refuse_references(one.reference.name)
     return chosen.solver(array, t, readings, errors, start, **followed)
