@@ -16,12 +16,10 @@ from gfimu.base.version import __version__
 from gfimu.motion.attitude import from_rotation
 from gfimu.motion.estimate import FORMAT_VERSION, Estimate
 from gfimu.rate.axis.accuracy.bounds import require_visible
-from gfimu.rate.axis.channels import AxisChannels
 from gfimu.rate.axis.fit import fit_axis
 from gfimu.rate.axis.problem import AxisProblem
 from gfimu.rate.axis.recursion import smooth_axis
 from gfimu.rate.axis.rest import begins_at_rest
-from gfimu.rate.sensing import SensorErrors
 from gfimu.recording import Recording
 from gfimu.recording.carried_array import array_metadata
 from gfimu.recording.clipping import without_clipped
@@ -80,9 +78,7 @@ def estimate_about_axis(
     noise = white_noise_std(array, recording.sample_rate) if noise_std is None else np.asarray(noise_std, dtype=float)
     noise = np.ascontiguousarray(np.broadcast_to(noise, array.n_channels))
     if at_rest is None:
-        errors = SensorErrors.of_recording(array, recording.metadata, recording.sample_rate)
-        spread = errors.bias_std
-        at_rest = begins_at_rest(y, AxisChannels.of(array, axis), axis, noise, spread, 1.0 / recording.sample_rate)
+        at_rest = begins_at_rest(y, array, axis, noise, 1.0 / recording.sample_rate, recording.metadata)
     fit = fit_axis(t, y, array, axis, noise, at_rest=at_rest)
     one, channels, mounted = fit.settings, fit.channels, fit.mounting
     slopes = None if mounted is None else mounted.mounting.slopes(mounted.values)

@@ -26,7 +26,7 @@ from gfimu.motion.channel_health import UsedReadings, watched_readings
 from gfimu.motion.earth import EarthRotation
 from gfimu.motion.estimate import FORMAT_VERSION, Estimate
 from gfimu.motion.navigation import level, navigate
-from gfimu.motion.references import references_of
+from gfimu.motion.references import references_of, require_references
 from gfimu.rate.path_start import PathStart
 from gfimu.rate.problem import RateProblem, RateSolution
 from gfimu.rate.registry import rate_method
@@ -130,6 +130,7 @@ def estimate(
     rate0 = None if omega0 is None else np.asarray(omega0, dtype=float)
     for name in use:
         chosen.refuse_references(name)
+    require_references(recording, use)
     if keep_faulty:
         chosen.refuse_keep_faulty()
     if rate0 is not None and (rate0.shape != (3,) or not np.isfinite(rate0).all()):

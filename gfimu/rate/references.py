@@ -37,6 +37,8 @@ class ReferencePolicy:
         Rate across the axis that bearings leave, rad/s.
     least_noise : float
         Least noise of a value, rad/s, rad or m: that of a good tachometer, a 16-bit encoder, optical tracking.
+    unknown_offset : float
+        Uncertainty of the offset of an encoder or of positions whose value at the first sample is missing, rad or m.
     """
 
     gain_std: float = 0.01
@@ -44,6 +46,7 @@ class ReferencePolicy:
     axis_std: float = 0.0175
     wobble_std: float = 0.01
     least_noise: float = 1e-4
+    unknown_offset: float = 1e3
 
 
 class _Error(NamedTuple):
@@ -98,15 +101,24 @@ class Reference:
         return cls("axis", 0, across, policy.wobble_std, errors)
 
     @classmethod
-    def encoder(cls, noise_std: float, policy: ReferencePolicy = ReferencePolicy()) -> Reference:
-        """Return an angle about the table's axis, rad, less that of the first sample, with a delay."""
-        errors = (_Error(0, CONSTANT, noise_std), _Error(0, RATE, policy.delay_std_s))
+    def encoder(
+        cls, noise_std: float, *, first_known: bool = True, policy: ReferencePolicy = ReferencePolicy()
+    ) -> Reference:
+        """Return an angle about the table's axis, rad, less its first value, with a delay.
+
+        ``first_known``: the first value is that of the first sample, where the angle of the run is zero.
+        """
+        offset = noise_std if first_known else policy.unknown_offset
+        errors = (_Error(0, CONSTANT, offset), _Error(0, RATE, policy.delay_std_s))
         return cls("angle", ANGLE, np.eye(1, 3), noise_std, errors)
 
     @classmethod
-    def position(cls, noise_std: float) -> Reference:
-        """Return positions of the origin, m, in the axes of the world, less that of the first sample."""
-        errors = tuple(_Error(axis, CONSTANT, noise_std) for axis in range(3))
+    def position(
+        cls, noise_std: float, *, first_known: bool = True, policy: ReferencePolicy = ReferencePolicy()
+    ) -> Reference:
+        """Return positions of the origin, m, in the axes of the world, less the first; ``first_known`` as `encoder`."""
+        offset = noise_std if first_known else policy.unknown_offset
+        errors = tuple(_Error(axis, CONSTANT, offset) for axis in range(3))
         return cls("position", POSITION, np.eye(3), noise_std, errors)
 
     @property

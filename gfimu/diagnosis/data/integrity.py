@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.base.difference_noise import difference_noise
 from gfimu.diagnosis.data.faults.clipping import clipping_level, own_rails
 from gfimu.diagnosis.data.faults.rails import Rail, on_rails, rail_parameters, rail_sentence
 from gfimu.diagnosis.data.faults.wiring import Fault, find_wiring, range_factors, rewired
-from gfimu.diagnosis.data.reference import difference_noise
 from gfimu.diagnosis.data.rounding import common_step
 from gfimu.diagnosis.data.run import Run
 from gfimu.diagnosis.data.samples import (

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
+from gfimu.base.difference_noise import difference_noise
 from gfimu.base.errors import InputError
 from gfimu.diagnosis.data.time_grid import TimeGrid
 from gfimu.model.world_model import WorldModel
@@ -23,7 +24,6 @@ __all__ = [
     "GYRO_COLUMNS",
     "REFERENCE_COLUMNS",
     "SHORTEST_PIECE",
-    "difference_noise",
     "driving_reference",
     "reference_on_grid",
     "refuse_dead_reference",
@@ -197,11 +197,3 @@ def unreferenced(valid: NDArray[np.bool_], period: float) -> NDArray[np.bool_]:
     if out.any() and len(valid) - begin < SHORTEST_PIECE / period:
         out[begin:] = True
     return out
-
-
-def difference_noise(reference: NDArray[np.float64]) -> float:
-    """Return the white noise of a smooth reference from its third differences (robust), rad/s or rad."""
-    third = np.diff(reference, n=3)
-    if not len(third):
-        return 0.0
-    return 1.4826 * float(np.median(np.abs(third - np.median(third)))) / np.sqrt(20.0)

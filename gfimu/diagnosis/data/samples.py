@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 from scipy.special import ndtr
 
-from gfimu.diagnosis.data.reference import difference_noise
+from gfimu.base.difference_noise import difference_noise
 from gfimu.diagnosis.data.run import Run
 from gfimu.diagnosis.policy import Policy
 from gfimu.recording.importing.oddities import BEYOND_PILE, LONGEST_EQUAL, is_within_range

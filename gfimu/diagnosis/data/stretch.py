@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
+from gfimu.base.difference_noise import difference_noise
 from gfimu.base.errors import GfimuError
 from gfimu.diagnosis.data.cosine_basis import CosineBasis, NoiseLevels
-from gfimu.diagnosis.data.reference import difference_noise
 from gfimu.diagnosis.data.rounding import COARSE, NO_STEPS, Steps
 from gfimu.diagnosis.data.run import Run, smooth_rate
 from gfimu.diagnosis.data.table.spins import JoinedSpin, ScaledSpin, State

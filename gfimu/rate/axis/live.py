@@ -21,7 +21,6 @@ from gfimu.rate.axis.mounting import Mounting
 from gfimu.rate.axis.problem import AxisProblem, Settings
 from gfimu.rate.axis.recursion import filter_axis
 from gfimu.rate.axis.rest import begins_at_rest
-from gfimu.rate.sensing import SensorErrors
 from gfimu.rate.stream import LiveSample, SkippedLine, stream_samples
 
 __all__ = ["AxisSample", "LiveAxisFilter", "LiveAxisSettings", "axis_stream"]
@@ -185,8 +184,7 @@ class LiveAxisFilter:
         waiting, self._waiting = self._waiting, []
         t, y = np.array([one for one, _ in waiting]), np.array([one for _, one in waiting])
         if self._at_rest is None:
-            spread = SensorErrors.from_parts(self.array, 1.0 / self._period).bias_std
-            self._at_rest = begins_at_rest(y, self._channels, self.axis, self._noise, spread, self._period)
+            self._at_rest = begins_at_rest(y, self.array, self.axis, self._noise, self._period)
             self._sign = "decided" if self._at_rest else "undecided"
         self._numbers, covariance = first_settings(y, self._channels, self.axis, self._noise, at_rest=self._at_rest)
         tilt = self._numbers.inclination

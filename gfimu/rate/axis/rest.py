@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.array.array import AccelerometerArray
 from gfimu.array.turning_axis import TurningAxis
+from gfimu.base.errors import InputError
 from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.rate.axis.channels import AxisChannels
 from gfimu.rate.rest_test import RestTest, begins_still
+from gfimu.rate.sensing import SensorErrors
 
 __all__ = ["begins_at_rest"]
 
@@ -17,20 +24,25 @@ _SPINS = 4.0  # standard deviations, by the biases, from which Ω² counts: once
 
 def begins_at_rest(
     y: NDArray[np.float64],
-    channels: AxisChannels,
+    array: AccelerometerArray,
     axis: TurningAxis,
     noise_std: NDArray[np.float64],
-    bias_std: NDArray[np.float64],
     period: float,
+    metadata: Mapping[str, Any] = MappingProxyType({}),
 ) -> bool:
     """Return whether the first half second of readings (n, c), m/s², is rest.
 
     Still readings fit any Ω². The one that fits their mean best, beside an unknown specific force, or beside gravity
-    where few channels can't tell them apart and the axis is known to be vertical, is compared with what biases with the
-    standard deviations ``bias_std`` (c,) make of it.
+    where few channels can't tell them apart and the axis is known to be vertical, is compared with what biases make of
+    it, as a calibration in the recording's ``metadata`` or the parts' data sheets state them. Without that it is rest.
     """
     if not begins_still(y, noise_std, period):
         return False
+    try:
+        bias_std = SensorErrors.of_recording(array, metadata, 1.0 / period).bias_std
+    except InputError:  # a part without a data sheet
+        return True
+    channels = AxisChannels.of(array, axis)
     first = y[: RestTest().window(period)]
     mean = np.where(np.isfinite(first), first, 0.0).sum(axis=0) / np.maximum(np.isfinite(first).sum(axis=0), 1)
     seen = np.isfinite(first).any(axis=0) & (bias_std > 0.0)

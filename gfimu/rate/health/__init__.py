@@ -6,7 +6,6 @@ from gfimu.base.lazy_names import declared_names
 
 if TYPE_CHECKING:
     from gfimu.rate.health.detectable import detectable_faults
-    from gfimu.rate.health.gains import with_learnt_gains
     from gfimu.rate.health.monitor import ChannelMonitor
     from gfimu.rate.health.policy import MonitorPolicy
     from gfimu.rate.health.protection import fault_protection

@@ -196,9 +196,10 @@ def test_gyro_is_fused_and_the_estimate_goes_on_through_its_saturation(run):
     rng = np.random.default_rng(2)
     gyro = motion.omega + [0.2, -0.1, 0.3] + 0.01 * rng.standard_normal(motion.omega.shape)
     gyro[np.abs(motion.omega).max(axis=1) > 9.0] = np.nan  # saturated at 9 rad/s
-    told = replace(errors, gyro_noise_std=0.01)
-    fused = filter_rate(CUBE, motion.t, values, told, references=[Reference.gyro(told).measured(gyro, len(gyro))])
-    alone = filter_rate(CUBE, motion.t, values, told)
+    noisy_gyro = replace(errors, gyro_noise_std=0.01)
+    measured = Reference.gyro(noisy_gyro).measured(gyro, len(gyro))
+    fused = filter_rate(CUBE, motion.t, values, noisy_gyro, references=[measured])
+    alone = filter_rate(CUBE, motion.t, values, noisy_gyro)
     rows = slice(300, None)
     inside = np.flatnonzero(np.isnan(gyro[:, 0]))
     assert len(inside) > 50

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.base.difference_noise import difference_noise
 from gfimu.diagnosis.data.faults.rails import PILE, Rail, find_rails
-from gfimu.diagnosis.data.reference import difference_noise
 from gfimu.diagnosis.data.run import Run
 from gfimu.recording.importing.oddities import GARBAGE
 

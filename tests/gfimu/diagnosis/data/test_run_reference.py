@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from gfimu import InputError
+from gfimu.base.difference_noise import difference_noise
 from gfimu.diagnosis import time_grid
 from gfimu.diagnosis.data.reference import (
     BRIDGED_GAP,
     REFERENCE_COLUMNS,
-    difference_noise,
     driving_reference,
     reference_on_grid,
     unreferenced,

@@ -212,10 +212,17 @@ def test_a_steady_spin_from_the_first_sample_is_no_rest(array, axis):
     assert np.median([abs(one.rate) for one in samples[:300]]) > 5.0
 
 
+def test_still_readings_of_a_part_without_a_data_sheet_are_rest():
+    chips = tuple(replace(chip, part="own") for chip in TWO.chips)
+    recording, _ = steady(TWO, 8.0, np.random.default_rng(3))
+    found = estimate_about_axis(recording, AccelerometerArray("own", chips), UPRIGHT, noise_std=NOISE)
+    assert found.metadata["sign"] == "decided"
+
+
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize(("array", "axis"), [(ONE, TurningAxis.of("z", inclination=0.0)), (TWO, UPRIGHT)])
 def test_a_rest_with_biases_stays_one(array, axis, seed):
     recording, _ = steady(array, 0.0, np.random.default_rng(seed))
     found = estimate_about_axis(recording, array, axis)
-    assert np.abs(found.omega[0]).max() < 0.05  # later it is bent by biases that it is not told of
+    assert np.abs(found.omega[0]).max() < 0.05  # unknown biases bend it later
     assert found.metadata["sign"] == "decided"
