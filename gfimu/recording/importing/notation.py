@@ -88,8 +88,10 @@ _SAME = {
     "c": "degc",
     "celsius": "degc",
 }
-_ENDS = re.compile(r"^(.*?[A-Za-z0-9\]])[_ ,.]+(m_s2|mm_s2|cm_s2|rad_s|deg_s|[A-Za-zµ°/²^]+[0-9]?)$")
-_WORDS = {"g", "s", "h", "d", "c", "min", "gs", "day", "hz", "rev", "turn", "turns", "second", "gal"}
+_AMBIGUOUS = {"g", "s", "h", "d", "c", "min", "gs", "day", "hz", "rev", "turn", "turns", "second", "gal"}
+_WORD = re.compile(r"[^_ ,.]+")
+_JOINTS = "_ ,."
+_MOST_WORDS = 4  # numerical: deg_per_second, m_per_s_squared
 _BRACKETS = re.compile(r"[\[({]((?:[^\[\](){}]|\([^\[\](){}]*\))+)[\])}]$")
 
 
@@ -100,7 +102,16 @@ def _plain(text: str) -> str:
     )
     short = short.replace("°c", "degc").replace("°", "deg").replace("^", "").replace("*", "").replace("·", "")
     short = re.sub(r"[\s()]", "", short)
-    return _SAME.get(short, short)
+    return _SAME.get(short) or _SAME.get(_joined(short), _joined(short))
+
+
+def _joined(short: str) -> str:
+    """Return a unit in words as its sign: ``deg_per_s`` as ``deg/s``, ``m_per_second_squared`` as ``m/s2``."""
+    plain = re.sub(r"_?per_?|_/_?|/_", "/", short)
+    plain = re.sub(r"(?<=/)(?:seconds?|sec)(?![a-z])", "s", plain)
+    plain = re.sub(r"_?(?:squared|sq|\*\*2)$", "2", re.sub(r"(?<=/)(?:s_?s|s/s)$", "s2", plain))
+    plain = re.sub(r"^(?:degrees?)(?=/)", "deg", re.sub(r"^(?:radians?)(?=/)", "rad", plain))
+    return re.sub(r"^(?:met(?:er|re)s?)(?=/)", "m", plain)
 
 
 def factor_of(unit: str, kind: str, *, where: str = "") -> float:
@@ -152,7 +163,9 @@ def unit_of_name(name: str) -> tuple[str, str]:
     plain, unit = bracketed_unit(name)
     if unit:
         return plain, unit
-    found = _ENDS.match(name.strip())
-    if found is None or found[2].lower() in _WORDS or not kind_of(found[2]):
-        return plain, ""
-    return found[1], found[2]
+    words = list(_WORD.finditer(plain))
+    for first in words[-_MOST_WORDS:]:
+        unit = plain[first.start() :]
+        if first.start() and plain[first.start() - 1] in _JOINTS and unit.lower() not in _AMBIGUOUS and kind_of(unit):
+            return plain[: first.start()].rstrip(_JOINTS), unit
+    return plain, ""

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.recording.importing.column_map import REFERENCE_KINDS, ColumnSpec
+from gfimu.recording.importing.guessing.names import words_of
 from gfimu.recording.importing.guessing.times import find_time
 from gfimu.recording.importing.guessing.triads import Triad, find_triads, is_acceleration
 from gfimu.recording.importing.guessing.units import TriadUnit, triad_values, unit_of_rate
@@ -33,10 +34,10 @@ __all__ = [
 LEAST_ROWS = 0.2  # of the longest table: a table of another chip has as many samples
 GYRO = ("gyro_x_rad_s", "gyro_y_rad_s", "gyro_z_rad_s")
 _AXIS = re.compile(r"(?<![b-z])[xyz](?![a-z])")
-_TACHO = ("tacho", "rpm", "omega", "speed")
-_ANGLE = ("angle", "theta", "encoder")
-_TEMPERATURE = ("temperature", "temp_", "degc", "imu_temp")
-_OTHER_QUANTITY = re.compile(r"gps|ground|wind|km/?h|mph|knots|[ _]?[xyz]$|steer")
+_TACHO = re.compile(r"tacho|\brpm|omega|speed|ang\w* ?(vel|rate)|rotation(al)? (vel|rate)|\bspin\b|turntable")
+_ANGLE = re.compile(r"angle|theta|\bphi\b|encoder|rotation$|\bwinkel|angular pos|ang pos")
+_TEMPERATURE = re.compile(r"temp(erature)?\b|\bdegc|imu temp")
+_OTHER_QUANTITY = re.compile(r"gps|ground|wind|km ?h\b|mph|knots|\b(\w*(gyr|rate|omega)\w*|w)?[xyz]$|steer|stamp")
 
 
 def reason(why: str, sure: bool) -> str:
@@ -147,19 +148,16 @@ def other_references(table: RawTable, taken: Collection[str]) -> Part:
 
 def known_reference(name: str) -> tuple[str, str] | None:
     """Return the reference that a column is by its name, and its unit or the usual one; None if it is none."""
-    plain, unit = unit_of_name(name.lower())
-    if _OTHER_QUANTITY.search(plain) or (not unit and re.search(r"[\[(].*[\])]\s*$", plain)):
+    words, (plain, unit) = words_of(name), unit_of_name(name.lower())
+    if _OTHER_QUANTITY.search(words) or (not unit and re.search(r"[\[(].*[\])]\s*$", plain)):
         return None
-    words = {"tacho_rad_s": _TACHO, "angle_rad": _ANGLE, "temperature_degC": _TEMPERATURE}
-    for key, marks in words.items():
-        if any(mark in name.lower() for mark in marks) or (key == "temperature_degC" and plain == "temp"):
-            if unit:
-                return (key, unit) if kind_of(unit) == REFERENCE_KINDS[key] else None
-            if key == "temperature_degC":
-                return key, "degC"
+    for key, mark in (("temperature_degC", _TEMPERATURE), ("angle_rad", _ANGLE), ("tacho_rad_s", _TACHO)):
+        if kind_of(unit) == REFERENCE_KINDS[key] and (mark.search(words) or unit == "rpm"):
+            return key, unit
+        if not unit and mark.search(words):
             degrees = "deg" in plain
-            usual = "rpm" if "rpm" in plain else "deg/s" if degrees else "rad/s"
-            return key, usual if key == "tacho_rad_s" else "deg" if degrees else "rad"
+            rate = "rpm" if "rpm" in plain else "deg/s" if degrees else "rad/s"
+            return key, {"temperature_degC": "degC", "tacho_rad_s": rate, "angle_rad": "deg" if degrees else "rad"}[key]
     return None
 
 

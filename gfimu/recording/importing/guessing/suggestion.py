@@ -87,12 +87,17 @@ def suggest(raw: RawFile, *, table: str = "", name: str = "map") -> Suggestion:
     reasons: list[str] = []
     chosen = raw.table(table) if table else _most_promising(raw)
     time = find_time(chosen)
-    split_by = find_split(chosen, time.columns[0] if time.columns else None)
-    if split_by is not None:
-        raw = split_file(RawFile(raw.source, raw.format, {chosen.name: chosen}), split_by, raw.source)
+    split = find_split(chosen, time.columns[0] if time.columns else None)
+    if split is not None:
+        raw = split_file(RawFile(raw.source, raw.format, {chosen.name: chosen}), split.column, raw.source)
         chosen = _most_promising(raw)
         time = find_time(chosen)
-        reasons.append(f"{split_by} names the chip of each row: {', '.join(raw.tables)}")
+        listed = ", ".join(raw.tables)
+        reasons.append(
+            reason(f"{split.column} names parts of the recording: {listed}; table = {chosen.name!r} is taken", False)
+            if split.is_part
+            else f"{split.column} names the chip of each row: {listed}"
+        )
     missing = _missing(raw)
     if missing:
         raw = _without(raw, missing)
@@ -111,6 +116,7 @@ def suggest(raw: RawFile, *, table: str = "", name: str = "map") -> Suggestion:
     chips = [
         found
         for other in raw.tables.values()
+        if other is chosen or split is None or not split.is_part
         for found in (own if other is chosen else _alike(other, chosen, own) if own else [])
     ]
     units = [unit_of_acceleration(one, triad.columns) for one, triad in chips]
@@ -150,7 +156,7 @@ def suggest(raw: RawFile, *, table: str = "", name: str = "map") -> Suggestion:
             text=TextSpec() if chosen.named else TextSpec(columns=tuple(chosen.columns)),
             table=chosen.name if len(raw.tables) > 1 else "",
             format="" if raw.format in _UNNAMED else raw.format,
-            split_by=split_by or "",
+            split_by=split.column if split is not None else "",
             skip_rows=skipped,
             missing=missing,
         )

@@ -149,7 +149,7 @@ def _of_numbers(table: RawTable, name: str, values: NDArray[Any]) -> tuple[float
     plain, unit = unit_of_name(name)
     has_unit = bool(unit) and kind_of(unit) == "time"
     word = any(mark in plain.lower() for mark in _WORDS) or plain.lower() in {"t", "ts", "ms", "us"} or has_unit
-    counter = None if word and not _COUNTERS.search(plain) else _counter(table, name, steps)
+    counter = None if word and not _COUNTERS.search(plain) else _counter(table, name, values, steps)
     if counter is not None:
         return counter
     within = _within_seconds(name, known, steps)
@@ -187,25 +187,30 @@ def _scatter(steps: NDArray[np.float64], usual: float) -> float:
     return min(0.5, float(np.median(np.abs(steps - usual))) / usual)
 
 
-def _counter(table: RawTable, name: str, steps: NDArray[np.float64]) -> tuple[float, TimeGuess] | None:
+def _counter(
+    table: RawTable, name: str, values: NDArray[Any], steps: NDArray[np.float64]
+) -> tuple[float, TimeGuess] | None:
     """Return how a column that counts samples gives the time."""
     back = steps[steps < 0]
     wrap = float(1.0 - back.min()) if len(back) else None
+    if wrap is not None and (wrap < 4.0 or math.log2(wrap) % 1.0 or len(back) > 0.3 * len(steps)):
+        wrap = None  # it starts anew where the recording does
     ones = float(np.mean(np.isin(steps, [1.0] if wrap is None else [1.0, 1.0 - wrap])))
-    if ones < 0.9 or (wrap is not None and (wrap < 4.0 or math.log2(wrap) % 1.0 or len(back) > 0.3 * len(steps))):
+    if ones < 0.9:
         return None
+    part = _part(np.asarray(values, dtype=float)) if wrap is None else None
     rate = stated_rate(table)
     if rate is None and not _COUNTERS.search(unit_of_name(name)[0]):
         return None
     if rate is None:
-        spec = TimeSpec(name, rate_hz=_UNKNOWN_RATE_HZ, wrap=wrap)
+        spec = TimeSpec(name, rate_hz=_UNKNOWN_RATE_HZ, wrap=wrap, part=part)
         why = (
             f"{name} counts samples, and the file states no rate: rate_hz = {_UNKNOWN_RATE_HZ:g} only holds the place, "
             "give the true one"
         )
         return 0.5, TimeGuess(spec, why, False, False)
     why = f"{name} counts samples; the file states {rate[1]!r}"
-    return 0.9, TimeGuess(TimeSpec(name, rate_hz=rate[0], wrap=wrap), why)
+    return 0.9, TimeGuess(TimeSpec(name, rate_hz=rate[0], wrap=wrap, part=part), why)
 
 
 def _rounded(name: str, values: NDArray[Any], factor: float | None) -> tuple[float, TimeGuess] | None:
