@@ -26,6 +26,8 @@ ANGLE = {"rad": 1.0, "mrad": 1e-3, "deg": _DEGREE, "rev": math.tau}
 TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "d": 86400.0}
 TEMPERATURE = {"degc": 1.0}
 LENGTH = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
+FIELD = {"ut": 1e-6, "mt": 1e-3, "nt": 1e-9, "gauss": 1e-4, "mgauss": 1e-7}
+PRESSURE = {"pa": 1.0, "hpa": 1e2, "kpa": 1e3, "mbar": 1e2}
 SPEED = {"m/s": 1.0, "mm/s": 1e-3, "mm/min": 1e-3 / 60.0}
 
 _KINDS = {
@@ -36,6 +38,8 @@ _KINDS = {
     "temperature": TEMPERATURE,
     "length": LENGTH,
     "speed": SPEED,
+    "field": FIELD,
+    "pressure": PRESSURE,
 }
 _SAME = {
     "m/s/s": "m/s2",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection
 from dataclasses import dataclass
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -29,6 +30,7 @@ __all__ = [
     "other_references",
     "reason",
     "single_axes",
+    "varies",
 ]
 
 LEAST_ROWS = 0.2  # of the longest table: a table of another chip has as many samples
@@ -37,7 +39,10 @@ _AXIS = re.compile(r"(?<![b-z])[xyz](?![a-z])")
 _TACHO = re.compile(r"tacho|\brpm|omega|speed|ang\w* ?(vel|rate)|rotation(al)? (vel|rate)|\bspin\b|turntable")
 _ANGLE = re.compile(r"angle|theta|\bphi\b|encoder|rotation$|\bwinkel|angular pos|ang pos")
 _TEMPERATURE = re.compile(r"temp(erature)?\b|\bdegc|imu temp")
-_OTHER_QUANTITY = re.compile(r"gps|ground|wind|km ?h\b|mph|knots|\b(\w*(gyr|rate|omega)\w*|w)?[xyz]$|steer|stamp")
+_OTHER_QUANTITY = re.compile(
+    r"gps|cov\w*|\bstd|alpha$|beta$|gamma$|ground|wind|km ?h\b|mph|knots|steer|stamp"
+    r"|\b(\w*(gyr|rate|omega)\w*|w)?[xyz]$"
+)
 
 
 def reason(why: str, sure: bool) -> str:
@@ -64,7 +69,8 @@ def chip_part(number: int, chosen: RawTable, table: RawTable, triad: Triad, unit
     }
     roles = {name: f"{key}, {_scaled(unit)}" for key, name in zip(columns, triad.columns, strict=True)}
     where = f" of {elsewhere}" if elsewhere else ""
-    why = reason(f"chip a{number} ({', '.join(triad.columns)}{where}): {unit.why}", unit.sure)
+    doubt = "; by its name a program has computed it from others" if triad.is_processed else ""
+    why = reason(f"chip a{number} ({', '.join(triad.columns)}{where}): {unit.why}{doubt}", unit.sure and not doubt)
     return Part(columns, {} if elsewhere else roles, (why,), (f"a{number}1",) if unit.sure else ())
 
 
@@ -105,11 +111,13 @@ def gyro_part(
         found = [(other, one) for other in raw.tables.values() if other is not chosen for one in _rates(other, chosen)]
     if not found:
         return Part({}, {}, ())
-    table, triad = found[0]
-    values = triad_values(table, triad.columns)
-    unit = unit_of_rate(
-        values, triad.columns[0], force if force is not None and len(force) == len(values) else None, rate_hz
-    )
+    tried = []
+    for table, triad in found:
+        values = triad_values(table, triad.columns)
+        alike = force if force is not None and len(force) == len(values) else None
+        tried.append((table, triad, unit_of_rate(values, triad.columns[0], alike, rate_hz)))
+    # Without names that show a rate, the one is the gyro by which gravity turns.
+    table, triad, unit = max(tried, key=lambda one: (one[1].by_name, one[2].is_gravity))
     elsewhere = "" if table is chosen else table.name
     columns = {
         key: msgspec.structs.replace(_spec(name, unit, 0), table=elsewhere)
@@ -136,7 +144,7 @@ def other_references(table: RawTable, taken: Collection[str]) -> Part:
     reasons = []
     for name in table.columns:
         known = known_reference(name)
-        if known is None or name in taken or known[0] in found or table.columns[name].dtype == object:
+        if known is None or name in taken or known[0] in found or not varies(table.columns[name]):
             continue
         key, unit = known
         found[key] = ColumnSpec(name, unit)
@@ -146,13 +154,22 @@ def other_references(table: RawTable, taken: Collection[str]) -> Part:
     return Part(found, roles, tuple(reasons))
 
 
+def varies(values: NDArray[Any]) -> bool:
+    """Whether a column holds numbers that are not all the same."""
+    if values.dtype.kind not in "iuf":
+        return False
+    known = values[np.isfinite(values)]
+    return bool(len(known)) and bool((known != known[0]).any())
+
+
 def known_reference(name: str) -> tuple[str, str] | None:
     """Return the reference that a column is by its name, and its unit or the usual one; None if it is none."""
     words, (plain, unit) = words_of(name), unit_of_name(name.lower())
     if _OTHER_QUANTITY.search(words) or (not unit and re.search(r"[\[(].*[\])]\s*$", plain)):
         return None
     for key, mark in (("temperature_degC", _TEMPERATURE), ("angle_rad", _ANGLE), ("tacho_rad_s", _TACHO)):
-        if kind_of(unit) == REFERENCE_KINDS[key] and (mark.search(words) or unit == "rpm"):
+        sure = unit == "rpm" or key == "temperature_degC"
+        if kind_of(unit) == REFERENCE_KINDS[key] and (mark.search(words) or sure):
             return key, unit
         if not unit and mark.search(words):
             degrees = "deg" in plain

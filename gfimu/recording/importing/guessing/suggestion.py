@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.base.errors import InputError
+from gfimu.recording.doubts.samples import sentinels_of
 from gfimu.recording.importing.clock import times_of
 from gfimu.recording.importing.column_map import REFERENCE_KINDS, ColumnMap, TextSpec, TimeSpec, load_map
 from gfimu.recording.importing.guessing.parts import (
@@ -27,7 +28,6 @@ from gfimu.recording.importing.guessing.times import RATES, TimeGuess, find_time
 from gfimu.recording.importing.guessing.triads import Triad, find_triads
 from gfimu.recording.importing.guessing.units import unit_of_acceleration
 from gfimu.recording.importing.notation import factor_of
-from gfimu.recording.importing.oddities import sentinels_of
 from gfimu.recording.importing.raw_table import RawFile, RawTable
 from gfimu.recording.importing.splitting import find_split, split_file
 

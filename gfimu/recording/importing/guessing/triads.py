@@ -24,7 +24,13 @@ from gfimu.recording.importing.guessing.names import (
     WEAK_RATE,
     words_of,
 )
-from gfimu.recording.importing.guessing.units import rest_windows, sphere_of, triad_values, unit_of_acceleration
+from gfimu.recording.importing.guessing.units import (
+    TriadUnit,
+    rest_windows,
+    sphere_of,
+    triad_values,
+    unit_of_acceleration,
+)
 from gfimu.recording.importing.notation import kind_of, unit_of_name
 from gfimu.recording.importing.raw_table import RawTable
 from gfimu.recording.policy import GuessPolicy
@@ -35,6 +41,7 @@ _NUMBERED = re.compile(r"(?P<before>.*?)(?P<number>\d+)(?P<after>\D*)")
 _AXES = (("x", "y", "z"), ("0", "1", "2"), ("1", "2", "3"))
 _ROUND = 0.1  # relative: by which the length at rest scatters where it is the same in all poses
 _NEAR_ZERO = 0.02  # of the largest reading
+_STEADY = 1e-3  # of the length: less than any accelerometer that is moved varies
 _POLICY = GuessPolicy()
 
 
@@ -52,6 +59,8 @@ class Triad:
         Whether the names, and not the numbers alone, show the kind.
     shows_gravity : bool
         Whether the length at rest is gravity.
+    is_usual : bool
+        Whether it is gravity in a usual unit or a usual number of counts.
     is_processed : bool
         Whether the names are those of an acceleration that a program has computed from others.
     why_not : str
@@ -62,6 +71,7 @@ class Triad:
     kind: str
     by_name: bool = False
     shows_gravity: bool = False
+    is_usual: bool = False
     is_processed: bool = False
     why_not: str = ""
 
@@ -74,7 +84,7 @@ def find_triads(table: RawTable, taken: Sequence[str] = ()) -> list[Triad]:
     """
     free = {_short(name): name for name in table.columns if name not in taken and table.columns[name].dtype != object}
     if not table.named:
-        return _chosen([one for run in _runs(table, free.values()) for one in _without_names(table, run)])
+        return _chosen([one for run in _runs(table, free.values()) for one in _without_names(table, run)], named=False)
     found = _numbered(table, free)
     used = {_short(name) for one in found for name in one.columns}
     for short, name in free.items():
@@ -87,7 +97,7 @@ def find_triads(table: RawTable, taken: Sequence[str] = ()) -> list[Triad]:
                     continue
                 used |= set(three)
                 found.append(triad)
-    return _chosen(found)
+    return _chosen(found, named=True)
 
 
 def _threes_of(short: str) -> list[tuple[str, str, str]]:
@@ -187,18 +197,22 @@ def _threes(table: RawTable, names: Sequence[str]) -> list[Triad]:
     return [_triad(table, (names[at], names[at + 1], names[at + 2])) for at in range(0, len(names) - 2, 3)]
 
 
-def _chosen(triads: Sequence[Triad]) -> list[Triad]:
+def _chosen(triads: list[Triad], *, named: bool) -> list[Triad]:
     """Return triads; where one shows gravity, others that neither show it nor are named so are no acceleration."""
     if not any(one.kind == "acceleration" for one in triads):
         # A wheel that never rests shows no gravity; without names something has to be the acceleration.
-        return [replace(one, kind="acceleration") if one.kind and not one.by_name else one for one in triads]
-    if not any(one.kind == "acceleration" and one.shows_gravity for one in triads):
-        return [replace(one, kind="") if one.is_processed else one for one in triads]
-    raw = any(one.kind == "acceleration" and one.shows_gravity and not one.is_processed for one in triads)
+        return triads if named else [replace(one, kind="acceleration") if one.kind else one for one in triads]
+    showing = [one for one in triads if one.kind == "acceleration" and one.shows_gravity]
+    if not showing:
+        return [replace(one, kind="") if one.is_processed or (named and not one.by_name) else one for one in triads]
+    raw = any(not one.is_processed for one in showing)
+    usual = any(one.is_usual for one in showing)
     found = []
     for one in triads:
         if one.is_processed and one.kind == "acceleration" and (raw or not one.shows_gravity):
             found.append(replace(one, kind=""))
+        elif one in showing and usual and not one.is_usual and not one.by_name:
+            found.append(replace(one, kind=""))  # of constant length without being gravity: a magnetic field
         elif one.kind == "acceleration" and not one.shows_gravity and not one.by_name:
             found.append(replace(one, kind="rate"))
         else:
@@ -232,13 +246,15 @@ def _triad(table: RawTable, columns: tuple[str, str, str]) -> Triad:
     """Return three columns with what they measure by all evidence: unit, words, the table's name, and the numbers."""
     words = words_of(columns[0]) if table.named else ""
     named, is_processed = _evidence_of_names(words, words_of(table.name), unit_of_name(columns[0])[1])
-    numbers, shows_gravity = _evidence_of_numbers(table, columns)
+    numbers, unit = _evidence_of_numbers(table, columns)
     kinds = ("", "acceleration", "rate")  # of equal ones the first
     kind = max(kinds, key=lambda one: named.get(one, 0.0) + numbers.get(one, 0.0))
     by_name = max(kinds, key=lambda one: named.get(one, 0.0))
     why_not = f"its name is that of {by_name or 'something else'}" if kind != by_name and named else ""
     is_sure = named.get(kind, 0.0) > _POLICY.letter
-    return Triad(columns, kind, is_sure, kind == "acceleration" and shows_gravity, is_processed, why_not)
+    gravity = unit is not None and unit.is_gravity and kind == "acceleration"
+    is_usual = gravity and unit is not None and not any(unit.offset)
+    return Triad(columns, kind, is_sure, gravity, is_usual, is_processed, why_not)
 
 
 def _evidence_of_names(words: str, table: str, unit: str) -> tuple[dict[str, float], bool]:
@@ -268,19 +284,22 @@ def _evidence_of_names(words: str, table: str, unit: str) -> tuple[dict[str, flo
     return found, bool(PROCESSED.search(words) or (not words and PROCESSED.search(table)))
 
 
-def _evidence_of_numbers(table: RawTable, columns: tuple[str, str, str]) -> tuple[dict[str, float], bool]:
-    """Return log odds of what three columns measure by their length at rest, and whether it is gravity."""
+def _evidence_of_numbers(table: RawTable, columns: tuple[str, str, str]) -> tuple[dict[str, float], TriadUnit | None]:
+    """Return log odds of what three columns measure by their length at rest, and its unit as an acceleration."""
     values = triad_values(table, columns)
     windows = rest_windows(values)
     unit = unit_of_name(columns[0])[1]
     if not len(windows) or not values[np.isfinite(values)].any() or (unit and kind_of(unit) != "acceleration"):
-        return {}, False
+        return {}, None
     lengths = np.linalg.norm(windows, axis=1)
     usual = float(np.median(lengths))
     is_constant = float(np.std(lengths)) < _ROUND * usual and usual > _NEAR_ZERO * float(np.nanmax(np.abs(values)))
     is_sphere = sphere_of(windows) is not None
     if not is_constant and not is_sphere:
-        return {"rate": _POLICY.zero}, False
-    is_gravity = unit_of_acceleration(table, columns).is_gravity
+        return {"rate": _POLICY.zero}, None
+    guess = unit_of_acceleration(table, columns)
+    is_gravity = guess.is_gravity
+    if not (is_gravity and not any(guess.offset)) and float(np.nanmax(np.nanstd(values, axis=0))) < _STEADY * usual:
+        return {}, None  # what hardly varies, as a place on the Earth
     odds = _POLICY.constant + (_POLICY.gravity if is_gravity else 0.0) + (_POLICY.poses if is_sphere else 0.0)
-    return {"acceleration": odds}, is_gravity
+    return {"acceleration": odds}, guess
