@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import datetime as dt
+import itertools
 import sys
 import zipfile
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -22,9 +24,10 @@ from gfimu.recording.importing.raw_table import RawFile, RawTable
 from gfimu.recording.importing.readers.text import GROWS, cell_values, table_of_text
 from gfimu.recording.reading import parsing, read_bytes
 
-__all__ = ["is_workbook", "read_excel", "read_json"]
+__all__ = ["read_excel", "read_json"]
 
 _LEAST_ROWS = 3
+_MOST_LINES, _LONGEST_WORDS = 100, 200  # of what is stated beside the readings, characters of each
 _MOST_CELLS = 64  # of a list in a record: what has more is no sample
 _GROWS: Mapping[bytes, int] = {b"{": 280, b"[": 100, b",": 48, b":": 62}
 """Numerical: memory for an object, a list, a value and a key of JSON while they become columns, bytes, measured."""
@@ -48,10 +51,22 @@ def read_json(path: Path, text: TextSpec = TextSpec()) -> RawFile:
     tables = {name: table for name, table in _tables(content, "") if len(table) >= _LEAST_ROWS}
     if not tables:
         raise InputError(f"{path}: JSON without a list of readings; write a record per sample, or a list per column")
+    stated = tuple(itertools.islice(_stated(content, ""), _MOST_LINES))
     note = (f"{path}: left out {lost} lines that are no JSON",) if lost else ()
     return RawFile(
-        str(path), "json", {name: RawTable(name, one.columns, (*note, *one.notes)) for name, one in tables.items()}
+        str(path),
+        "json",
+        {name: replace(one, notes=(*note, *one.notes), preamble=stated) for name, one in tables.items()},
     )
+
+
+def _stated(content: Any, name: str) -> Iterator[str]:
+    """Yield the single values beside the readings, as the sample rate, one line each."""
+    if isinstance(content, Mapping):
+        for key, one in content.items():
+            yield from _stated(one, f"{name}.{key}".lstrip("."))
+    elif not isinstance(content, list):
+        yield f"{name}: {str(content)[:_LONGEST_WORDS]}"
 
 
 def _lines(data: bytes) -> tuple[list[Any], int]:
@@ -72,7 +87,8 @@ def _tables(content: Any, name: str) -> Iterator[tuple[str, RawTable]]:
         if all(isinstance(one, Mapping) for one in content[:_LEAST_ROWS]):
             yield from _of_records(content, name)
         elif _is_matrix(content):
-            yield name, _table(name, dict(_side_by_side({"row": content})), [])
+            columns = dict(_side_by_side({"row": content}))
+            yield name, replace(_table(name, columns, []), named=False)
         elif all(isinstance(one, list) for one in content[:_LEAST_ROWS]):
             yield from _of_records([{"row": one} for one in content], name)
     elif isinstance(content, Mapping):
@@ -171,15 +187,6 @@ def _table(name: str, columns: Mapping[str, list[Any]], notes: list[str]) -> Raw
             if unreadable:
                 notes.append(f"column {key}: {unreadable} cells are no numbers and count as missing")
     return RawTable(name, found, tuple(notes))
-
-
-def is_workbook(path: Path) -> bool:
-    """Whether a zip archive is an Excel workbook."""
-    try:
-        with zipfile.ZipFile(path) as archive:
-            return any(name.startswith("xl/") for name in archive.namelist())
-    except (zipfile.BadZipFile, OSError, ValueError, RuntimeError):  # also of a version that is not implemented
-        return False
 
 
 def read_excel(path: Path, text: TextSpec = TextSpec()) -> RawFile:

@@ -22,7 +22,7 @@ from gfimu.recording.tables.arrow import as_found
 from gfimu.recording.tables.column_file import open_parquet
 from gfimu.recording.tables.table_columns import TableColumns
 
-__all__ = ["read_archive", "read_parquet", "table_file"]
+__all__ = ["read_archive", "read_arrow", "read_parquet", "table_file"]
 
 
 def read_parquet(path: Path, text: TextSpec = TextSpec()) -> RawFile:
@@ -33,6 +33,14 @@ def read_parquet(path: Path, text: TextSpec = TextSpec()) -> RawFile:
             file.schema_arrow.names
         )  # one column after the other: in Arrow's form and NumPy's, all take twice as much
         return RawFile(str(path), "parquet", {"": _arrow_table((one, file.read([one]).column(one)) for one in names)})
+
+
+def read_arrow(path: Path, text: TextSpec = TextSpec()) -> RawFile:
+    """Read an Arrow file (Feather 2)."""
+    with parsing(path, "Arrow file", "write it again"):  # Arrow's own pools would take memory in advance
+        table = pa.ipc.open_file(path.read_bytes(), memory_pool=pa.system_memory_pool()).read_all()
+        MemoryLimit.of(path).needs(2 * table.nbytes)
+        return RawFile(str(path), "arrow", {"": _arrow_table(zip(table.column_names, table.columns, strict=True))})
 
 
 def _arrow_table(found: Iterable[tuple[str, pa.ChunkedArray]]) -> RawTable:

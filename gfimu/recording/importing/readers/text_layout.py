@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from gfimu.recording.importing.notation import kind_of, unit_of_name
 
-__all__ = ["COMMENT_MARKS", "Layout", "cells_of", "layout_of"]
+__all__ = ["COMMENT_MARKS", "Layout", "cells_of", "layout_of", "trailer", "upright"]
 
 COMMENT_MARKS = "#;%/*"
 _LONGEST_CELL = 100  # characters of a number or time
@@ -24,6 +24,9 @@ _NUMBER = {
     ),
 }
 _STAMP = re.compile(r"(\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4})?[T _]*(\d{1,2}:\d\d(:\d\d([.,:]\d+)?)?)?\s*([AaPp][Mm]|Z)?")
+_NOTHING = re.compile(r"n/?a|null|none|-", re.IGNORECASE)
+_FLAT, _LEAST_FLAT = 5, 20  # numbers per line, of those without a name times the lines, where each line is a column
+_MOST_LAST = 20  # lines after the numbers
 _LEAST_NUMBERS = 0.5  # of the cells of a line of data
 _NO_UNITS = {"", "-", "1", "raw", "cal", "counts", "lsb", "%", "mv", "v", "ut", "gauss", "hpa", "pa", "local_flux"}
 
@@ -106,6 +109,45 @@ def cells_of(line: str, separator: str) -> list[str]:
         except csv.Error:  # a cell longer than any, or a return in it
             pass
     return [cell.strip() for cell in closed.split(separator)]
+
+
+def upright(lines: Sequence[str]) -> list[str]:
+    """Return the lines of a text file that has a column per line, a name or none before its numbers, as usual ones."""
+    filled = [line for line in lines if line.strip() and line.lstrip()[0] not in COMMENT_MARKS]
+    if len(filled) < 2:
+        return list(lines)
+    mark = max(_SEPARATORS.values(), key=lambda one: len(cells_of(filled[0], one)))
+    rows = [cells_of(line, mark) for line in filled]
+    width = len(rows[-1])
+    rows = [row for row in rows if len(row) == width]
+    named = not any(_is_datum(row[0]) for row in rows)
+    if width < (1 if named else _FLAT) * max(_LEAST_FLAT, len(rows)) or 2 * len(rows) < len(filled):
+        return list(lines)
+    if not all(_is_datum(row[1]) for row in rows):
+        return list(lines)  # a line of names above
+    rest = [line for line in lines if line not in filled or len(cells_of(line, mark)) != width]
+    return [*(f"# {line}" for line in rest if line.strip()), *("\t".join(cells) for cells in zip(*rows, strict=True))]
+
+
+def trailer(last: Sequence[str], row: str, layout: Layout) -> list[str]:
+    """Return the lines after the numbers that state something: words in them where a row has numbers."""
+    pattern = [_is_datum(cell) for cell in cells_of(row, layout.separator)]
+    found: list[str] = []
+    for line in reversed(last[-_MOST_LAST:]):
+        cells = cells_of(line, layout.separator)
+        is_row = len(cells) == len(pattern) and all(
+            _is_datum(cell) or not known for cell, known in zip(cells, pattern, strict=True)
+        )
+        if is_row or (line.strip() and not re.search(r"[A-Za-z]{2}", line)):
+            break
+        found += [line.strip()] if line.strip() else []
+    return found[::-1]
+
+
+def _is_datum(cell: str) -> bool:
+    """Whether a cell may be one of a row of numbers: a number with either decimal mark, a date or time, or nothing."""
+    plain = cell.strip('"')[:_LONGEST_CELL]
+    return any(one.fullmatch(plain) for one in (*_NUMBER.values(), _STAMP, _NOTHING))
 
 
 def _data_lines(lines: Sequence[str], separator: str, decimal: str, skip: int) -> list[tuple[int, list[str]]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections import Counter
 from collections.abc import Sequence
@@ -20,9 +21,14 @@ _REMARK = re.compile(r"(?<=\d)\s*(?://|#)[^\"]*$")
 _COLOURS = re.compile(r"\x1b\[[\d;]*m")
 _TICK = re.compile(r"^\s*[IWEDV] \((\d+)\)")
 _UNIT = re.compile(r"\s*([A-Za-zµ°²%/^\d]{0,8})\s*$")
+_NUMBERS = re.compile(r"(?<![\w.+-])X(?:[\s,;]+X)+[\s,;]*$".replace("X", r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"))
+_PREFIX = re.compile(r"(?:(?<!\w)([A-Za-z]\w*)|[\])])\s*(?::|->|-|>|\|)\s*$")
+_SECONDS = re.compile(r"\[\s*(\d+\.\d+)\]")
 _HOST = "host_time"
+_LABVIEW, _END = "LabVIEW Measurement", "***End_of_Header***"
 _LONGEST = 10_000  # characters of a line of a serial monitor
 _LEAST = 0.5  # of the filled lines
+_MOST_LABELS = 8  # words before the numbers of a log: sensors
 _LEAST_OFTEN = 0.5  # of the lines of the most frequent kind
 
 
@@ -31,7 +37,8 @@ def plain_lines(lines: Sequence[str]) -> list[str]:
 
     Named cells become a table with a header. Other lines stay as they are.
     """
-    return _without_labels(_with_host_time(_without_frames(list(lines))))
+    lines = _of_labview(lines) if lines and lines[0].startswith(_LABVIEW) else list(lines)
+    return _without_labels(_without_prefixes(_with_host_time(_without_frames(lines))))
 
 
 def _most(lines: Sequence[str], mark: re.Pattern[str]) -> bool:
@@ -69,6 +76,49 @@ def _with_host_time(lines: list[str]) -> list[str]:
     return plain
 
 
+def _without_prefixes(lines: list[str]) -> list[str]:
+    """Return lines as ``[INFO] [12.345]: 0.1, 0.2`` without what a log puts before, with its time as the first cell.
+
+    Lines that begin with different words, as ``acc: 0.1 0.2 9.8``, have three named cells each.
+    """
+    if not _most(lines, _NUMBERS):
+        return lines
+    plain, labels = list(lines), []
+    found: list[tuple[int, str, str, list[str]]] = []
+    for index, line in enumerate(lines):
+        run = _NUMBERS.search(line) if len(line) <= _LONGEST else None
+        prefix = _PREFIX.search(line[: run.start()]) if run else None
+        if run is not None and prefix is not None:
+            labels.append(prefix[1] or "")
+            found.append((index, _stamp(line[: run.start()]), labels[-1], re.split(r"[\s,;]+", run[0].strip(" ,;"))))
+    if len(found) <= _LEAST * sum(bool(line.strip()) for line in lines):
+        return lines
+    several = 1 < len(set(labels)) <= _MOST_LABELS and all(len(cells) == 3 for *_, cells in found)
+    for index, stamp, label, numbers in found:
+        named = [f"{label} {axis}: {cell}" for axis, cell in zip("XYZ", numbers, strict=True)] if several else numbers
+        plain[index] = ",".join([stamp, *named] if stamp else named)
+    return plain
+
+
+def _of_labview(lines: Sequence[str]) -> list[str]:
+    """Return the names, units and rows of all segments of a LabVIEW measurement file; its rate as a comment."""
+    fields = {line.split("\t")[0]: line.split("\t")[1:] for line in lines[:_LOOKED_AT]}
+    ends = [place for place, line in enumerate(lines) if line.startswith(_END)]
+    names, rows = "", []
+    for place, after in zip(ends[1:], [*ends[2:], len(lines)], strict=True):
+        names = lines[place + 1].removesuffix("\tComment") if place + 1 < after else names
+        segment = lines[place + 2 : after]
+        rows += segment[: next((number for number, line in enumerate(segment) if not line.strip()), after)]
+    width = names.count("\t") + 1
+    rows = ["\t".join(line.split("\t")[:width]) for line in rows]
+    steps = fields.get("Delta_X", ["0"])[0].replace(",", ".")
+    rate = (
+        [f"# sample rate {1.0 / float(steps):.9g} Hz"] if re.fullmatch(r"[\d.]*[1-9][\d.]*(E[+-]\d+)?", steps) else []
+    )
+    units = "\t".join(["s", *fields.get("Y_Unit_Label", [])[: width - 1]])
+    return [*rate, names, units, *rows] if rows else list(lines)
+
+
 def _without_labels(lines: list[str]) -> list[str]:
     """Return lines as ``t:88 ax:0.1`` as a header and lines of numbers; several kinds of lines in turn make one row."""
     looked = [line for line in lines[:_LOOKED_AT] if line.strip()]
@@ -93,13 +143,14 @@ def _without_labels(lines: list[str]) -> list[str]:
         numbers = [number for _, number in _LABELLED.findall(line)]
         cells = [stamp, *numbers] if labels[0] == _HOST and stamp else numbers
         rows[-1] |= dict(zip(labels, cells, strict=True))
-    return [";".join(names), *(";".join(row.get(name, "") for name in names) for row in rows)]
+    before = [f"# {line}" for line in itertools.takewhile(lambda line: _labels(line) not in order, lines)]
+    return [*before, ";".join(names), *(";".join(row.get(name, "") for name in names) for row in rows)]
 
 
 def _stamp(text: str) -> str:
     """Return the time in front of a line: a date or time of day, or ms since the start as an ESP32 prints them."""
     found = _STAMP.search(text)
-    tick = _TICK.match(text)
+    tick = _TICK.match(text) or _SECONDS.search(text)
     return found[0] if found else tick[1] if tick else ""
 
 
