@@ -102,7 +102,7 @@ def _tables(content: Any, name: str) -> Iterator[tuple[str, RawTable]]:
         if len(plain) >= 2 and len(lengths) == 1:
             yield name, _table(name, dict(_side_by_side(plain)), [])
         for key, one in content.items():
-            if key not in plain or len(lengths) != 1:
+            if key not in plain or len(plain) < 2 or len(lengths) != 1:
                 yield from _tables(one, f"{name}.{key}".lstrip("."))
 
 

@@ -85,11 +85,14 @@ def layout_of(
             counted = [(number, len(cells)) for number, cells in data]
             (width, lines_so), *_ = Counter(count for _, count in counted).most_common(1)
             first = next(number for number, count in counted if count == width) if skip is None else skip
-            header = _header(looked[:first], mark, width) if not names else None
+            row_name = cells_of(looked[first], mark)[0]
+            header = _header(looked[:first], mark, width, row_name) if not names else None
             numbered = tuple(f"column_{place}" for place in range(1, width + 1))
             # Names may end before the cells do, as where a separator closes each line.
             known = tuple(names) + numbered[len(names) :] if names else header or numbered
-            score = (lines_so, _share_read([cells for _, cells in data if len(cells) == width], point), width)
+            share = _share_read([cells for _, cells in data if len(cells) == width], point)
+            # Spaces part dates from times and words of names too: another mark goes before them where it reads as much.
+            score = (lines_so, share, width if mark != " " else 1)
             # A point is the usual decimal mark: a comma has to read more lines, or more cells of them.
             if best is None or score > best[0]:
                 best = score, Layout(mark, point, first, known, bool(names) or header is not None)
@@ -173,13 +176,13 @@ def _share_read(lines: Sequence[Sequence[str]], decimal: str) -> float:
     return round(read / max(len(filled), 1), 2)
 
 
-def _header(before: Sequence[str], separator: str, width: int) -> tuple[str, ...] | None:
+def _header(before: Sequence[str], separator: str, width: int, row_name: str) -> tuple[str, ...] | None:
     """Return the names in the last line before the numbers, if it has one for each cell; with a line of units below."""
     units: list[str] = []
     for line in reversed(before):
         if not line.strip():
             continue
-        cells = _named_cells(line, separator, width)
+        cells = _named_cells(line, separator, width, is_row_named=row_name[:1] == '"' or not _is_datum(row_name))
         if cells is None:
             break
         if not units and _are_units(cells):
@@ -189,13 +192,15 @@ def _header(before: Sequence[str], separator: str, width: int) -> tuple[str, ...
     return _names(units, []) if units else None
 
 
-def _named_cells(line: str, separator: str, width: int) -> list[str] | None:
+def _named_cells(line: str, separator: str, width: int, *, is_row_named: bool) -> list[str] | None:
     """Return the cells of a line of names, one for each cell of a line of numbers; None where the numbers differ."""
     cells = cells_of(line.lstrip().lstrip(COMMENT_MARKS).lstrip(), separator)
     if len(cells) == width + 1:  # the line says what it is: ";Headers, time, Ax"; or it ends in a separator
         cells = cells[1:] if cells[-1] else cells[:-1]
     if len(cells) < width - 1 or len(cells) > width:
         return None
+    if is_row_named and len(cells) < width:
+        return ["", *(cell.strip('"') for cell in cells)]
     return cells + [""] * (width - len(cells))
 
 

@@ -10,13 +10,17 @@ from collections.abc import Sequence
 __all__ = ["plain_lines"]
 
 _LOOKED_AT = 400  # lines
-_HOST_TIME = re.compile(r"^\s*\[?(\d{1,2}:\d\d:\d\d[.,:]\d+)\]?\s*(?:->|>|\]|\|)\s*")
+_DATE = r"(?:\d{4}-\d\d-\d\d[T _])?"
+_HOST_TIME = re.compile(
+    rf"^\s*\[?({_DATE}\d{{1,2}}:\d\d:\d\d[.,:]\d+)\]?(?:\s*(?:->|>|\]|\|)\s*|\s+(?=[^\s,;]+\s*[,;\t]))"
+)
 _LABELLED = re.compile(
     r"([A-Za-z_][\w .\[\]()/°²^-]{0,60}?)\s*[:=]\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?![\d:])"
 )
 _BRACKETED = re.compile(r"^\s*[\[({][^A-Za-z\"]*[\])}]\s*,?\s*$")
 _CHECKED = re.compile(r"\*[0-9A-Fa-f]{2}\s*$")
-_STAMP = re.compile(r"(?:\d{4}-\d\d-\d\d[T _])?\d{1,2}:\d\d:\d\d(?:[.,:]\d+)?")
+_STAMP = re.compile(rf"{_DATE}\d{{1,2}}:\d\d:\d\d(?:[.,:]\d+)?")
+_PLOTTED = re.compile(r"^>([A-Za-z_][\w.]*):(\d+(?:\.\d+)?):([+-]?[\d.]+(?:[eE][+-]?\d+)?)")
 _REMARK = re.compile(r"(?<=\d)\s*(?://|#)[^\"]*$")
 _COLOURS = re.compile(r"\x1b\[[\d;]*m")
 _TICK = re.compile(r"^\s*[IWEDV] \((\d+)\)")
@@ -52,6 +56,13 @@ def _without_frames(lines: list[str]) -> list[str]:
     lines = [_COLOURS.sub("", line) for line in lines] if any("\x1b" in line for line in lines[:_LOOKED_AT]) else lines
     if _most(lines, _REMARK):
         lines = [_REMARK.sub("", line) for line in lines]
+    if _most(lines, _PLOTTED):
+        first = next(found[1] for line in lines if (found := _PLOTTED.match(line)))
+        return [
+            f"time:{one[2]},{one[1]}:{one[3]}" if one[1] == first else f"{one[1]}:{one[3]}"
+            for one in map(_PLOTTED.match, lines)
+            if one
+        ]
     if _most(lines, _BRACKETED):
         return [re.sub(r"[\[\](){}]", "", line) if _BRACKETED.search(line) else line for line in lines]
     if _most(lines, _CHECKED):
@@ -127,6 +138,7 @@ def _without_labels(lines: list[str]) -> list[str]:
         return lines
     often = max(kinds.values())
     order = [labels for labels in kinds if kinds[labels] >= _LEAST_OFTEN * often]
+    order = [labels[labels[0] == _HOST and place > 0 :] for place, labels in enumerate(order)]
     if sum(len(labels) for labels in order) < 3:
         return lines
     names = [name for labels in order for name in labels]
@@ -135,6 +147,7 @@ def _without_labels(lines: list[str]) -> list[str]:
     rows: list[dict[str, str]] = []
     for line in lines:
         labels = _labels(line)
+        labels = labels if labels in order else labels[1:]
         if labels not in order:
             continue
         if labels == order[0] or not rows:

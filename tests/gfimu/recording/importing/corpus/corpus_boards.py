@@ -30,7 +30,9 @@ def arduino_plotter(d):
 @shape("https://github.com/arduino/arduino-ide (serial monitor with time stamps)")
 def arduino_monitor_times(d):
     m = motion()
-    made = [f"{s} -> {x:.3f}\t{y:.3f}\t{z:.3f}" for s, (x, y, z) in zip(stamps(m.t, "{time}.{ms}"), m.force, strict=True)]
+    made = [
+        f"{s} -> {x:.3f}\t{y:.3f}\t{z:.3f}" for s, (x, y, z) in zip(stamps(m.t, "{time}.{ms}"), m.force, strict=True)
+    ]
     return Right(lines(d / "monitor.txt", [], made), (m.force,), 100.0)
 
 
@@ -39,9 +41,19 @@ def adafruit_mpu6050(d):
     m = motion()
     made = []
     for f, w in zip(m.force, m.gyro, strict=True):
-        made += ["Acceleration X: {:.2f}, Y: {:.2f}, Z: {:.2f} m/s^2".format(*f), "Rotation X: {:.2f}, Y: {:.2f}, Z: {:.2f} rad/s".format(*w)]
+        made += [
+            "Acceleration X: {:.2f}, Y: {:.2f}, Z: {:.2f} m/s^2".format(*f),
+            "Rotation X: {:.2f}, Y: {:.2f}, Z: {:.2f} rad/s".format(*w),
+        ]
         made += ["Temperature: 26.53 degC", ""]
-    return Right(lines(d / "serial.txt", ["Adafruit MPU6050 test!", "MPU6050 Found!"], made), (m.force,), None, m.gyro, doubt=True)
+    return Right(
+        lines(d / "serial.txt", ["Adafruit MPU6050 test!", "MPU6050 Found!"], made),
+        (m.force,),
+        None,
+        m.gyro,
+        {"temperature_degC": 0 * m.t + 26.53},
+        doubt=True,
+    )
 
 
 @shape("https://github.com/adafruit/Adafruit_ADXL345 (sensortest)")
@@ -78,7 +90,15 @@ def adxl355_raspberry(d):
 def openlog_artemis(d):
     m = motion()
     head = ["rtcDate,rtcTime,aX,aY,aZ,gX,gY,gZ,mX,mY,mZ,imu_degC,output_Hz,"]
-    columns = [stamps(m.t, "{date}"), stamps(m.t, "{time}.{ms}"), *(1000 * m.g).T, *m.deg.T, *(20 * m.g).T, 0 * m.t + 24, 0 * m.t + 99.8]
+    columns = [
+        stamps(m.t, "{date}"),
+        stamps(m.t, "{time}.{ms}"),
+        *(1000 * m.g).T,
+        *m.deg.T,
+        *m.field.T,
+        0 * m.t + 24,
+        0 * m.t + 99.8,
+    ]
     path = rows(d / "dataLog00001.TXT", head, columns, end=",", form="{:.2f}")
     return Right(path, (m.force,), 100.0, m.gyro, {"temperature_degC": 0 * m.t + 24}, doubt=True)
 
@@ -94,7 +114,13 @@ def microbit_log(d):
 def unico(d):
     m = motion(104.0)
     head = ["STEVAL-MKI197V1 (LSM6DSOX)", "", "A_X [mg]\tA_Y [mg]\tA_Z [mg]\tG_X [dps]\tG_Y [dps]\tG_Z [dps]"]
-    return Right(rows(d / "lsm6dsox.txt", head, [*(1000 * m.g).T, *m.deg.T], "\t", "{:.2f}"), (m.force,), None, m.gyro, doubt=True)
+    return Right(
+        rows(d / "lsm6dsox.txt", head, [*(1000 * m.g).T, *m.deg.T], "\t", "{:.2f}"),
+        (m.force,),
+        None,
+        m.gyro,
+        doubt=True,
+    )
 
 
 @shape(ST)
@@ -123,7 +149,10 @@ def esp_idf_log(d):
 @shape("https://docs.zephyrproject.org (logging)")
 def zephyr_log(d):
     m = motion()
-    made = [f"[{s},000] <inf> imu: {x:.4f}, {y:.4f}, {z:.4f}" for s, (x, y, z) in zip(stamps(m.t, "00:{time}.{ms}"), m.force, strict=True)]
+    made = [
+        f"[{s},000] <inf> imu: {x:.4f}, {y:.4f}, {z:.4f}"
+        for s, (x, y, z) in zip(stamps(m.t, "00:{time}.{ms}"), m.force, strict=True)
+    ]
     made = [one.replace("[00:10:", "[00:", 1) for one in made]
     return Right(lines(d / "zephyr.log", ["*** Booting Zephyr OS build v3.6.0 ***"], made), (m.force,), 100.0)
 
@@ -131,21 +160,30 @@ def zephyr_log(d):
 @shape("https://github.com/zephyrproject-rtos/zephyr/tree/main/samples/sensor/lis2dh")
 def zephyr_lis2dh(d):
     m = motion()
-    made = [f"#{k} @ {t} ms: x {x:f} , y {y:f} , z {z:f}" for k, (t, (x, y, z)) in enumerate(zip(ms(m.t, 12), m.force, strict=True))]
+    made = [
+        f"#{k} @ {t} ms: x {x:f} , y {y:f} , z {z:f}"
+        for k, (t, (x, y, z)) in enumerate(zip(ms(m.t, 12), m.force, strict=True))
+    ]
     return Right(lines(d / "lis2dh.txt", ["Polling at 100 Hz"], made), (m.force,), 100.0)
 
 
 @shape("https://docs.python.org/3/library/logging.html")
 def python_logging(d):
     m = motion()
-    made = [f"{s.replace('.', ',')} - imu - INFO - {x:.4f},{y:.4f},{z:.4f}" for s, (x, y, z) in zip(stamps(m.t), m.force, strict=True)]
+    made = [
+        f"{s.replace('.', ',')} - imu - INFO - {x:.4f},{y:.4f},{z:.4f}"
+        for s, (x, y, z) in zip(stamps(m.t), m.force, strict=True)
+    ]
     return Right(lines(d / "imu.log", [], made), (m.force,), 100.0)
 
 
 @shape("https://wiki.ros.org/rosconsole")
 def rosconsole_log(d):
     m = motion()
-    made = [f"[INFO] [{1715941514.123 + t:.9f}] [imu_node]: {x:.4f} {y:.4f} {z:.4f}" for t, (x, y, z) in zip(m.t, m.force, strict=True)]
+    made = [
+        f"[INFO] [{1715941514.123 + t:.9f}] [imu_node]: {x:.4f} {y:.4f} {z:.4f}"
+        for t, (x, y, z) in zip(m.t, m.force, strict=True)
+    ]
     return Right(lines(d / "rosout.log", [], made), (m.force,), 100.0)
 
 
@@ -162,9 +200,11 @@ def two_sensors_in_turn(d):
 def sense_hat(d):
     m = motion(10.0, 60.0)
     names = "temp,pres,hum,pitch,roll,yaw,mag_x,mag_y,mag_z,acc_x,acc_y,acc_z,gyro_x,gyro_y,gyro_z,datetime"
-    columns = [0 * m.t + 27.3, 0 * m.t + 1013.2, 0 * m.t + 41.0, *(18 + 9 * m.gravity.T), *(2 * m.gravity.T), *m.g.T, *m.gyro.T]
+    columns = [0 * m.t + 27.3, 0 * m.t + 1013.2, 0 * m.t + 41.0, *(18 + 9 * m.gravity.T), *m.field.T, *m.g.T, *m.gyro.T]
     columns += [stamps(m.t, "{date} {time}.{us}")]
-    return Right(rows(d / "sense.csv", [names], columns), (m.force,), 10.0, m.gyro, {"temperature_degC": 0 * m.t + 27.3})
+    return Right(
+        rows(d / "sense.csv", [names], columns), (m.force,), 10.0, m.gyro, {"temperature_degC": 0 * m.t + 27.3}
+    )
 
 
 @shape("https://docs.edgeimpulse.com/reference/data-acquisition-format")
@@ -173,15 +213,25 @@ def edge_impulse_json(d):
 
     m = motion()
     sensors = [{"name": f"acc{a}", "units": "m/s2"} for a in "XYZ"]
-    payload = {"device_name": "ac:87", "device_type": "DISCO-L475VG-IOT01A", "interval_ms": 10, "sensors": sensors, "values": m.force.round(4).tolist()}
-    (d / "idle01.json").write_text(json.dumps({"protected": {"ver": "v1", "alg": "none"}, "signature": "00", "payload": payload}))
+    payload = {
+        "device_name": "ac:87",
+        "device_type": "DISCO-L475VG-IOT01A",
+        "interval_ms": 10,
+        "sensors": sensors,
+        "values": m.force.round(4).tolist(),
+    }
+    (d / "idle01.json").write_text(
+        json.dumps({"protected": {"ver": "v1", "alg": "none"}, "signature": "00", "payload": payload})
+    )
     return Right(d / "idle01.json", (m.force,), 100.0, doubt=True)
 
 
 @shape("https://docs.edgeimpulse.com (CSV)")
 def edge_impulse_csv(d):
     m = motion(62.5)
-    return Right(rows(d / "idle.csv", ["timestamp,accX,accY,accZ"], [("{:.0f}", 1000 * m.t), *m.force.T]), (m.force,), 62.5)
+    return Right(
+        rows(d / "idle.csv", ["timestamp,accX,accY,accZ"], [("{:.0f}", 1000 * m.t), *m.force.T]), (m.force,), 62.5
+    )
 
 
 @shape("https://github.com/adafruit/Adafruit_CircuitPython_LSM6DS (tuples)")
@@ -202,7 +252,11 @@ def thingy52(d):
 @shape("https://github.com/boschsensortec/COINES_SDK (example log)")
 def bosch_coines(d):
     m = motion()
-    head = ["BMI270 accelerometer and gyroscope example", "Range: 4 G, ODR: 100 Hz", "Data set, Acc_gX, Acc_gY, Acc_gZ, Gyro_X, Gyro_Y, Gyro_Z"]
+    head = [
+        "BMI270 accelerometer and gyroscope example",
+        "Range: 4 G, ODR: 100 Hz",
+        "Data set, Acc_gX, Acc_gY, Acc_gZ, Gyro_X, Gyro_Y, Gyro_Z",
+    ]
     path = rows(d / "bmi270.txt", head, [np.arange(len(m.t)), *m.g.T, *m.deg.T], ", ", "{:.2f}")
     return Right(path, (m.force,), 100.0, m.gyro)
 

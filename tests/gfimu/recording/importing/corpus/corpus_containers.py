@@ -35,7 +35,9 @@ def matlab_struct_array(d):
 
     m = motion(50.0)
     kind = [("t", object), ("ax", object), ("ay", object), ("az", object)]
-    savemat(d / "samples.mat", {"samples": np.array([tuple(row) for row in np.column_stack([m.t, m.force])], dtype=kind)})
+    savemat(
+        d / "samples.mat", {"samples": np.array([tuple(row) for row in np.column_stack([m.t, m.force])], dtype=kind)}
+    )
     return Right(d / "samples.mat", (m.force,), 50.0)
 
 
@@ -77,7 +79,10 @@ def feather(d):
     from pyarrow.feather import write_feather
 
     m = motion()
-    write_feather(pa.table({"timestamp_ms": ms(m.t), **{f"acc_{a}": m.force[:, k] for k, a in enumerate("xyz")}}), str(d / "run.feather"))
+    write_feather(
+        pa.table({"timestamp_ms": ms(m.t), **{f"acc_{a}": m.force[:, k] for k, a in enumerate("xyz")}}),
+        str(d / "run.feather"),
+    )
     return Right(d / "run.feather", (m.force,), 100.0)
 
 
@@ -88,7 +93,9 @@ def parquet(d):
 
     m = motion()
     stamp = np.datetime64("2024-05-17T10:25:14", "us") + np.round(1e6 * m.t).astype("timedelta64[us]")
-    pq.write_table(pa.table({"time": stamp, **{f"accel_{a}_g": m.g[:, k] for k, a in enumerate("xyz")}}), d / "run.parquet")
+    pq.write_table(
+        pa.table({"time": stamp, **{f"accel_{a}_g": m.g[:, k] for k, a in enumerate("xyz")}}), d / "run.parquet"
+    )
     return Right(d / "run.parquet", (m.force,), 100.0)
 
 
@@ -98,7 +105,10 @@ def workbook(d):
 
     m = motion(50.0)
     book = openpyxl.Workbook()
-    for row in [["Time (s)", "X (m/s^2)", "Y (m/s^2)", "Z (m/s^2)"], *np.column_stack([m.t, m.force]).round(5).tolist()]:
+    for row in [
+        ["Time (s)", "X (m/s^2)", "Y (m/s^2)", "Z (m/s^2)"],
+        *np.column_stack([m.t, m.force]).round(5).tolist(),
+    ]:
         book.active.append(row)
     book.save(d / "run.xlsx")
     return Right(d / "run.xlsx", (m.force,), 50.0)
@@ -129,7 +139,10 @@ def hdf5_matrix(d):
 @shape("https://jsonlines.org")
 def json_lines(d):
     m = motion()
-    made = [json.dumps({"ts": int(t), "acc": {"x": x, "y": y, "z": z}}) for t, (x, y, z) in zip(ms(m.t), m.force.round(5), strict=True)]
+    made = [
+        json.dumps({"ts": int(t), "acc": {"x": x, "y": y, "z": z}})
+        for t, (x, y, z) in zip(ms(m.t), m.force.round(5), strict=True)
+    ]
     (d / "run.jsonl").write_text("\n".join(made))
     return Right(d / "run.jsonl", (m.force,), 100.0)
 
@@ -137,7 +150,10 @@ def json_lines(d):
 @shape("https://pandas.pydata.org (DataFrame.to_json, orient='list')")
 def json_lists(d):
     m = motion()
-    content = {"meta": {"device": "node 3"}, "data": {"time": m.t.tolist(), **{f"acc_{a}": m.force[:, k].tolist() for k, a in enumerate("xyz")}}}
+    content = {
+        "meta": {"device": "node 3"},
+        "data": {"time": m.t.tolist(), **{f"acc_{a}": m.force[:, k].tolist() for k, a in enumerate("xyz")}},
+    }
     (d / "run.json").write_text(json.dumps(content, indent=1))
     return Right(d / "run.json", (m.force,), 100.0)
 
@@ -146,7 +162,12 @@ def json_lists(d):
 def json_device_motion(d):
     m = motion(60.0)
     records = [
-        {"timeStamp": 1000 * t + 812.4, "accelerationIncludingGravity": dict(zip("xyz", f, strict=True)), "rotationRate": dict(zip(("alpha", "beta", "gamma"), w, strict=True)), "interval": 16}
+        {
+            "timeStamp": 1000 * t + 812.4,
+            "accelerationIncludingGravity": dict(zip("xyz", f, strict=True)),
+            "rotationRate": dict(zip(("alpha", "beta", "gamma"), w, strict=True)),
+            "interval": 16,
+        }
         for t, f, w in zip(m.t.tolist(), m.force.tolist(), m.deg.tolist(), strict=True)
     ]
     (d / "motion.json").write_text(json.dumps(records))
@@ -173,7 +194,9 @@ def csv_xz(d):
 def transposed(d):
     m = motion(50.0)
     series = {"time [s]": m.t, "ax [m/s^2]": m.force[:, 0], "ay [m/s^2]": m.force[:, 1], "az [m/s^2]": m.force[:, 2]}
-    (d / "series.csv").write_text("".join(f"{name},{','.join(f'{one:.5f}' for one in values)}\n" for name, values in series.items()))
+    (d / "series.csv").write_text(
+        "".join(f"{name},{','.join(f'{one:.5f}' for one in values)}\n" for name, values in series.items())
+    )
     return Right(d / "series.csv", (m.force,), 50.0)
 
 

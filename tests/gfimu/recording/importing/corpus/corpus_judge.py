@@ -44,11 +44,20 @@ def judge(right: Right) -> Verdict:
     faults = list(_faults(right, found, recording))
     if not faults:
         return Verdict("right", "")
-    about = {"rate": "rate|time|row|sample", "chip": "chip", "gyro": "gyro", "reference": "reference|tacho|angle|temperature", "note": "$^"}
+    about = {
+        "rate": "rate|time|row|sample",
+        "chip": "chip",
+        "gyro": "gyro",
+        "reference": "reference|tacho|angle|temperature",
+        "note": "$^",
+    }
     silent = [text for subject, text in faults if not any(re.search(about[subject], line) for line in checks)]
     if right.doubt and checks and not silent:
         return Verdict("right", "; ".join(text for _, text in faults))
-    return Verdict("silent" if silent else "marked", "; ".join([*silent, *(f"[marked] {text}" for _, text in faults if text not in silent)]))
+    return Verdict(
+        "silent" if silent else "marked",
+        "; ".join([*silent, *(f"[marked] {text}" for _, text in faults if text not in silent)]),
+    )
 
 
 def _without_channels(right: Right, found, checks) -> Verdict:
@@ -83,7 +92,9 @@ def _faults(right: Right, found, recording):
     elif len(recording.t_s) < 0.98 * len(truth) or len(recording.t_s) > len(truth):
         yield "rate", f"{len(recording.t_s)} rows instead of {len(truth)}"
     elif not _same(recording.readings, truth, 0.06 + 0.02):
-        ratio = np.nanmedian(np.linalg.norm(recording.readings[:, :3], axis=1)) / np.median(np.linalg.norm(truth[:, :3], axis=1))
+        ratio = np.nanmedian(np.linalg.norm(recording.readings[:, :3], axis=1)) / np.median(
+            np.linalg.norm(truth[:, :3], axis=1)
+        )
         yield "chip", f"readings differ (length of the first chip {ratio:.4g} times): {dict(_named(found))}"
     have = set(GYRO) & set(recording.reference)
     if right.gyro is not None and not have:
@@ -94,7 +105,10 @@ def _faults(right: Right, found, recording):
         rates = np.column_stack([recording.reference[one] for one in GYRO])
         if not _same(rates, right.gyro, 0.02):
             ratio = np.nanstd(rates) / np.std(right.gyro)
-            yield "gyro", f"rates differ ({ratio:.4g} times): {[str(found.column_map.reference[one].column) for one in GYRO]}"
+            yield (
+                "gyro",
+                f"rates differ ({ratio:.4g} times): {[str(found.column_map.reference[one].column) for one in GYRO]}",
+            )
     for name, values in right.references.items():
         if name not in recording.reference:
             yield "reference", f"no {name}"

@@ -16,12 +16,13 @@ PLACES_M = 0.05 * np.array([(1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)])
 
 @dataclass(frozen=True)
 class Motion:
-    """Times (n,), s, readings of four chips (n, 3) each, m/s², rates (n, 3), rad/s, and gravity (n, 3), m/s²."""
+    """Times (n,), s, readings of four chips (n, 3) each, m/s², rates (n, 3), rad/s, gravity (n, 3), m/s², and a magnetic field (n, 3), µT."""
 
     t: np.ndarray
     chips: tuple[np.ndarray, ...]
     gyro: np.ndarray
     gravity: np.ndarray
+    field: np.ndarray
 
     @property
     def force(self) -> np.ndarray:
@@ -43,22 +44,22 @@ def motion(rate: float = 100.0, seconds: float = 12.0, seed: int = 8) -> Motion:
     rng = np.random.default_rng(seed)
     t = np.arange(round(rate * seconds)) / rate
     share = t / seconds
-    knots, turns, pose = [0.0], [Rotation.identity()], Rotation.identity()
-    for place in range(6):
-        knots.append(0.25 + place / 12.0)
-        turns.append(pose)
-        pose = Rotation.from_rotvec(rng.normal(0.0, 0.8, 3)) * pose
-        knots.append(0.25 + (place + 0.45) / 12.0)
-        turns.append(pose)
-        knots.append(0.25 + (place + 0.7) / 12.0)
-        turns.append(pose)
+    size = min(1.0, seconds / 10.0)  # of the turns: short files have no faster ones
+    knots, turns, pose = [], [], Rotation.identity()
+    for begin, end in [
+        (0.0, 0.25),
+        *((0.25 + (place + 0.5) / 12.0, 0.25 + (place + 1.0) / 12.0) for place in range(6)),
+    ]:
+        still = np.linspace(begin, end, max(4, round(60 * (end - begin))))
+        knots += still.tolist()
+        turns += [pose] * len(still)
+        pose = Rotation.from_rotvec(size * rng.normal(0.0, 0.8, 3)) * pose
     for place in range(5):
-        pose = Rotation.from_rotvec(rng.normal(0.0, 0.5, 3)) * pose
-        knots.append(0.80 + 0.07 * place)
+        knots.append(0.80 + 0.055 * place)
         turns.append(pose)
+        pose = Rotation.from_rotvec(size * rng.normal(0.0, 0.5, 3)) * pose
     spline = RotationSpline(np.array(knots) * seconds, Rotation.concatenate(turns))
-    at = np.clip(t, 0.0, knots[-1] * seconds)
-    turned, omega, alpha = spline(at).inv(), spline(at, 1), spline(at, 2)
+    turned, omega, alpha = spline(t).inv(), spline(t, 1), spline(t, 2)
     pushed = (share > 0.78)[:, None] * np.column_stack([np.sin(7 * t), np.cos(5 * t), np.sin(9 * t)])
     gravity = turned.apply(np.tile([0.0, 0.0, G], (len(t), 1)))
     chips = []
@@ -68,7 +69,8 @@ def motion(rate: float = 100.0, seconds: float = 12.0, seed: int = 8) -> Motion:
         errors = rng.normal(0.0, 0.05, 3) + 0.004 * rng.standard_normal(3) * force
         chips.append(force + errors + 0.015 * rng.standard_normal(force.shape))
     gyro = omega + rng.normal(0.0, 0.003, 3) + 0.002 * rng.standard_normal(omega.shape)
-    return Motion(t, tuple(chips), gyro, gravity)
+    field = turned.apply(np.tile([18.0, 2.0, -44.0], (len(t), 1))) + np.array([6.0, -9.0, 4.0])
+    return Motion(t, tuple(chips), gyro, gravity, field + 0.3 * rng.standard_normal(field.shape))
 
 
 @dataclass(frozen=True)
@@ -111,13 +113,19 @@ def shape(source: str) -> Callable[[Callable[[Path], Right]], Callable[[Path], R
     return added
 
 
-def rows(path, head, columns, separator=",", form="{:.6f}", end="", tail=(), line="\n", code="utf-8", mark=".", start=""):
+def rows(
+    path, head, columns, separator=",", form="{:.6f}", end="", tail=(), line="\n", code="utf-8", mark=".", start=""
+):
     """Write lines of columns; whole numbers and texts as they are; a column may bring its own form as (form, values)."""
 
     def texts(column):
         own, values = column if isinstance(column, tuple) else (form, column)
         return [
-            one if isinstance(one, str) else str(one) if isinstance(one, np.integer) else own.format(one).replace(".", mark)
+            one
+            if isinstance(one, str)
+            else str(one)
+            if isinstance(one, np.integer)
+            else own.format(one).replace(".", mark)
             for one in values
         ]
 

@@ -14,7 +14,9 @@ PHYPHOX = "https://phyphox.org/wiki/index.php/Export_data_formats"
 @shape(PHYPHOX)
 def phyphox_csv(d):
     m = motion()
-    head = ['"Time (s)","Acceleration x (m/s^2)","Acceleration y (m/s^2)","Acceleration z (m/s^2)","Absolute acceleration (m/s^2)"']
+    head = [
+        '"Time (s)","Acceleration x (m/s^2)","Acceleration y (m/s^2)","Acceleration z (m/s^2)","Absolute acceleration (m/s^2)"'
+    ]
     columns = [m.t + 0.0123, *m.force.T, np.linalg.norm(m.force, axis=1)]
     return Right(rows(d / "Raw Data.csv", head, columns, form="{:.9E}"), (m.force,), 100.0)
 
@@ -22,7 +24,9 @@ def phyphox_csv(d):
 @shape(PHYPHOX)
 def phyphox_without_gravity(d):
     m = motion()
-    head = ['"Time (s)","Linear Acceleration x (m/s^2)","Linear Acceleration y (m/s^2)","Linear Acceleration z (m/s^2)","Absolute acceleration (m/s^2)"']
+    head = [
+        '"Time (s)","Linear Acceleration x (m/s^2)","Linear Acceleration y (m/s^2)","Linear Acceleration z (m/s^2)","Absolute acceleration (m/s^2)"'
+    ]
     linear = m.force - m.gravity
     path = rows(d / "Raw Data.csv", head, [m.t, *linear.T, np.linalg.norm(linear, axis=1)], form="{:.9E}")
     return Right(path, refused="acceleration")
@@ -31,7 +35,9 @@ def phyphox_without_gravity(d):
 @shape(PHYPHOX)
 def phyphox_semicolons_decimal_comma(d):
     m = motion()
-    head = ['"Time (s)";"Acceleration x (m/s^2)";"Acceleration y (m/s^2)";"Acceleration z (m/s^2)";"Absolute acceleration (m/s^2)"']
+    head = [
+        '"Time (s)";"Acceleration x (m/s^2)";"Acceleration y (m/s^2)";"Acceleration z (m/s^2)";"Absolute acceleration (m/s^2)"'
+    ]
     columns = [m.t, *m.force.T, np.linalg.norm(m.force, axis=1)]
     return Right(rows(d / "Raw Data.csv", head, columns, ";", "{:.9E}", mark=","), (m.force,), 100.0)
 
@@ -69,7 +75,14 @@ def sensor_logger_json(d):
     for stamp, t, f, w in zip(ns(m.t), m.t, m.force, m.gyro, strict=True):
         for name, (x, y, z) in (("TotalAcceleration", f), ("Gyroscope", w)):
             records.append(
-                {"sensor": name, "time": str(stamp), "seconds_elapsed": f"{t:.7f}", "z": f"{z:.9f}", "y": f"{y:.9f}", "x": f"{x:.9f}"}
+                {
+                    "sensor": name,
+                    "time": str(stamp),
+                    "seconds_elapsed": f"{t:.7f}",
+                    "z": f"{z:.9f}",
+                    "y": f"{y:.9f}",
+                    "x": f"{x:.9f}",
+                }
             )
     (d / "phone.json").write_text(json.dumps(records))
     return Right(d / "phone.json", (m.force,), 50.0, m.gyro)
@@ -87,7 +100,7 @@ def physics_toolbox(d):
 def physics_toolbox_roller_coaster(d):
     m = motion()
     head = ["time;gFx;gFy;gFz;wx;wy;wz;p;Bx;By;Bz;Azimuth;Pitch;Roll"]
-    other = [0 * m.t + 1013.25, *(30.0 + m.gravity.T), *(10 * m.g.T)]
+    other = [0 * m.t + 1013.25, *m.field.T, *(18 + 9 * m.gravity.T)]
     columns = [m.t, *m.g.T, *m.gyro.T, *other]
     return Right(rows(d / "coaster.csv", head, columns, ";", "{:.4f}", mark=","), (m.force,), 100.0, m.gyro)
 
@@ -109,7 +122,11 @@ def sensorlog_ios(d):
 def androsensor(d):
     m = motion(50.0)
     names = [f"{what} {a} (m/s²)" for what in ("ACCELEROMETER", "GRAVITY", "LINEAR ACCELERATION") for a in "XYZ"]
-    names += [f"GYROSCOPE {a} (rad/s)" for a in "XYZ"] + ["SOUND LEVEL (dB)", "Time since start in ms ", "YYYY-MO-DD HH-MI-SS_SSS"]
+    names += [f"GYROSCOPE {a} (rad/s)" for a in "XYZ"] + [
+        "SOUND LEVEL (dB)",
+        "Time since start in ms ",
+        "YYYY-MO-DD HH-MI-SS_SSS",
+    ]
     other = [0 * m.t + 40.1, ms(m.t, 12.0), stamps(m.t, "{date} {time}:{ms}")]
     columns = [*m.force.T, *m.gravity.T, *(m.force - m.gravity).T, *m.gyro.T, *other]
     return Right(rows(d / "Sensor_record.csv", [";".join(names)], columns, ";", "{:.4f}"), (m.force,), 50.0, m.gyro)
@@ -142,7 +159,9 @@ def motionsense(d):
 @shape("https://github.com/espruino/BangleApps/tree/master/apps/accellog")
 def bangle_accellog(d):
     m = motion(12.5, 48.0)
-    return Right(rows(d / "accellog.1.csv", ["Time (ms),X,Y,Z"], [ms(m.t, 80), *m.g.T], form="{:.4f}"), (m.force,), 12.5)
+    return Right(
+        rows(d / "accellog.1.csv", ["Time (ms),X,Y,Z"], [ms(m.t, 80), *m.g.T], form="{:.4f}"), (m.force,), 12.5
+    )
 
 
 @shape("https://github.com/AaltoVision/ADVIO")

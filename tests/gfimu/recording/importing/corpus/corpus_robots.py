@@ -42,7 +42,7 @@ def ronin_hdf5(d):
 def ridi_csv(d):
     m = motion(200.0, 8.0)
     names = ["", "time"] + [f"{q}_{a}" for q in ("gyro", "acce", "linacce", "grav", "magnet", "pos") for a in "xyz"]
-    values = [m.gyro, m.force, m.force - m.gravity, m.gravity, 4 * m.gravity, np.cumsum(m.gyro, axis=0) / 200.0]
+    values = [m.gyro, m.force, m.force - m.gravity, m.gravity, m.field, np.cumsum(m.gyro, axis=0) / 200.0]
     columns = [np.arange(len(m.t)), ns(m.t), *(column for one in values for column in one.T)]
     return Right(rows(d / "data.csv", [",".join(names)], columns), (m.force,), 200.0, m.gyro)
 
@@ -65,17 +65,38 @@ def reprapfirmware(d):
 @shape("https://github.com/betaflight/blackbox-tools (blackbox_decode)")
 def betaflight(d):
     m = motion(250.0, 6.0)
-    head = ['"Product","Blackbox flight data recorder by Nicholas Sherlock"', '"acc_1G",2048', '"gyro_scale","0x3f800000"', '"looptime",4000']
-    names = ["loopIteration", "time", *(f"{q}[{k}]" for q in ("axisP", "rcCommand", "gyroADC", "accSmooth", "motor") for k in range(3))]
+    head = [
+        '"Product","Blackbox flight data recorder by Nicholas Sherlock"',
+        '"acc_1G",2048',
+        '"gyro_scale","0x3f800000"',
+        '"looptime",4000',
+    ]
+    names = [
+        "loopIteration",
+        "time",
+        *(f"{q}[{k}]" for q in ("axisP", "rcCommand", "gyroADC", "accSmooth", "motor") for k in range(3)),
+    ]
     noise = np.random.default_rng(0).integers(200, 1800, (9, len(m.t)))
-    columns = [4 * np.arange(len(m.t)), np.round(1e6 * m.t).astype(int), *noise[:6], *counts(m.deg, 1), *counts(m.g, 2048), *noise[6:]]
+    columns = [
+        4 * np.arange(len(m.t)),
+        np.round(1e6 * m.t).astype(int),
+        *noise[:6],
+        *counts(m.deg, 1),
+        *counts(m.g, 2048),
+        *noise[6:],
+    ]
     return Right(rows(d / "LOG00001.01.csv", [*head, ",".join(names)], columns), (m.force,), 250.0, m.gyro)
 
 
 @shape("https://github.com/betaflight/blackbox-tools (blackbox_decode with units)")
 def betaflight_units(d):
     m = motion(250.0, 6.0)
-    names = ["loopIteration", "time (us)", *(f"gyroADC[{k}] (deg/s)" for k in range(3)), *(f"accSmooth[{k}] (g)" for k in range(3))]
+    names = [
+        "loopIteration",
+        "time (us)",
+        *(f"gyroADC[{k}] (deg/s)" for k in range(3)),
+        *(f"accSmooth[{k}] (g)" for k in range(3)),
+    ]
     columns = [4 * np.arange(len(m.t)), np.round(1e6 * m.t).astype(int), *counts(m.deg, 1), *m.g.T]
     return Right(rows(d / "LOG00001.01.csv", [", ".join(names)], columns, ", "), (m.force,), 250.0, m.gyro)
 
@@ -134,12 +155,28 @@ def px4_sensor_accel(d):
 @shape(ROS + " (rostopic echo -p)")
 def rostopic_csv(d):
     m = motion()
-    names = ["%time", "field.header.seq", "field.header.stamp", "field.header.frame_id", *(f"field.orientation.{a}" for a in "xyzw")]
+    names = [
+        "%time",
+        "field.header.seq",
+        "field.header.stamp",
+        "field.header.frame_id",
+        *(f"field.orientation.{a}" for a in "xyzw"),
+    ]
     names += [f"field.orientation_covariance{k}" for k in range(9)] + [f"field.angular_velocity.{a}" for a in "xyz"]
-    names += [f"field.angular_velocity_covariance{k}" for k in range(9)] + [f"field.linear_acceleration.{a}" for a in "xyz"]
+    names += [f"field.angular_velocity_covariance{k}" for k in range(9)] + [
+        f"field.linear_acceleration.{a}" for a in "xyz"
+    ]
     names += [f"field.linear_acceleration_covariance{k}" for k in range(9)]
     still = [0 * m.t] * 9
-    columns = [ns(m.t) + 120_000, np.arange(len(m.t)), ns(m.t), ["imu_link"] * len(m.t), *[0 * m.t] * 3, 0 * m.t + 1, *still]
+    columns = [
+        ns(m.t) + 120_000,
+        np.arange(len(m.t)),
+        ns(m.t),
+        ["imu_link"] * len(m.t),
+        *[0 * m.t] * 3,
+        0 * m.t + 1,
+        *still,
+    ]
     columns += [*m.gyro.T, *still, *m.force.T, *still]
     return Right(rows(d / "imu.csv", [",".join(names)], columns), (m.force,), 100.0, m.gyro)
 
@@ -165,8 +202,8 @@ def crazyflie(d):
 def vectornav_ascii(d):
     m = motion(40.0, 20.0)
     lines = []
-    for k, (f, w) in enumerate(zip(m.force, m.gyro, strict=True)):
-        cells = ",".join(f"{one:+.4f}" for one in (*(0.1 * f), *f, *w))
+    for k, (f, w, b) in enumerate(zip(m.force, m.gyro, m.field, strict=True)):
+        cells = ",".join(f"{one:+.4f}" for one in (*(0.01 * b), *f, *w))
         lines.append(f"$VNIMU,{cells},+24.9,+101.303*{k % 256:02X}")
     (d / "vn.txt").write_text("\n".join(lines) + "\n")
     return Right(d / "vn.txt", (m.force,), None, m.gyro, doubt=True)
@@ -175,9 +212,21 @@ def vectornav_ascii(d):
 @shape("https://www.cvlibs.net/datasets/kitti (oxts, one line per frame)")
 def kitti_oxts(d):
     m = motion(100.0)
-    place = [("{:.9f}", 49.011 + 1e-6 * m.t), ("{:.9f}", 8.42 + 1e-6 * m.t), 0 * m.t + 112.8]
-    angles = [0.01 * m.gravity[:, 0], 0.01 * m.gravity[:, 1], 0.1 * m.t]
-    speeds = [0.3 * m.t, 0.1 * m.t, 0.32 * m.t, 0 * m.t, 0.01 * m.t]
+    rng = np.random.default_rng(0)
+    place = [49.011 + 1e-6 * m.t, 8.42 + 1e-6 * m.t, 112.8 + 0.01 * rng.standard_normal(len(m.t))]
+    angles = [0.01 * m.gravity[:, 0], 0.01 * m.gravity[:, 1], np.cumsum(m.gyro[:, 2]) / 100.0]
+    speeds = [*(np.cumsum(m.gyro, axis=0) / 30.0).T, *(0.02 * rng.standard_normal((2, len(m.t))))]
     state = [np.full(len(m.t), k) for k in (4, 11, 6, 6, 6)]
-    columns = [*place, *angles, *speeds, *m.force.T, *m.force.T, *m.gyro.T, *m.gyro.T, 0 * m.t + 0.05, 0 * m.t + 0.01, *state]
+    columns = [
+        *place,
+        *angles,
+        *speeds,
+        *m.force.T,
+        *m.force.T,
+        *m.gyro.T,
+        *m.gyro.T,
+        0 * m.t + 0.05,
+        0 * m.t + 0.01,
+        *state,
+    ]
     return Right(rows(d / "oxts.txt", [], columns, " ", "{:.9f}"), (m.force, m.force), None, m.gyro, doubt=True)

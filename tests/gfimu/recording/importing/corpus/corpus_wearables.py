@@ -13,7 +13,7 @@ def xsens_mtw(d):
     names = ["PacketCounter", "SampleTimeFine"]
     names += [f"{q}_{a}" for q in ("Acc", "FreeAcc", "Gyr", "Mag") for a in "XYZ"]
     free = m.force - m.gravity
-    columns = [34012 + np.arange(len(m.t)), ["" for _ in m.t], *m.force.T, *free.T, *m.gyro.T, *(0.1 * m.g.T)]
+    columns = [34012 + np.arange(len(m.t)), ["" for _ in m.t], *m.force.T, *free.T, *m.gyro.T, *(0.02 * m.field.T)]
     path = rows(d / "MT_0120089F.txt", [*head, "\t".join(names)], columns, "\t")
     return Right(path, (m.force,), 100.0, m.gyro)
 
@@ -25,7 +25,7 @@ def xsens_dot(d):
     names = ["PacketCounter", "SampleTimeFine"] + [f"{q}_{a}" for q in ("Euler", "Acc", "Gyr", "Mag") for a in "XYZ"]
     euler = 10 * m.gravity
     columns = [np.arange(len(m.t)), np.round(192_856_375 + 1e6 * m.t).astype(int), *euler.T, *m.force.T, *m.deg.T]
-    columns += [*(0.1 * m.g.T)]
+    columns += [*(0.02 * m.field.T)]
     path = rows(d / "D1.csv", [*head, ",".join(names)], columns)
     return Right(path, (m.force,), 60.0, m.gyro)
 
@@ -33,7 +33,10 @@ def xsens_dot(d):
 @shape(XSENS + ", free acceleration alone")
 def xsens_dot_free_acceleration(d):
     m = motion(60.0)
-    head = ["DeviceTag:,D1", "PacketCounter,SampleTimeFine,Euler_X,Euler_Y,Euler_Z,FreeAcc_X,FreeAcc_Y,FreeAcc_Z,Status"]
+    head = [
+        "DeviceTag:,D1",
+        "PacketCounter,SampleTimeFine,Euler_X,Euler_Y,Euler_Z,FreeAcc_X,FreeAcc_Y,FreeAcc_Z,Status",
+    ]
     euler, free = 10 * m.gravity, m.force - m.gravity
     columns = [np.arange(len(m.t)), np.round(1e6 * m.t).astype(int), *euler.T, *free.T, np.zeros(len(m.t), int)]
     return Right(rows(d / "D1_free.csv", head, columns), refused="acceleration")
@@ -46,8 +49,10 @@ def shimmer_consensys(d):
     names += [f"Shimmer_8665_Gyro_{a}_CAL" for a in "XYZ"] + [f"Shimmer_8665_Mag_{a}_CAL" for a in "XYZ"]
     units = ["ms", *["m/(s^2)"] * 3, *["deg/s"] * 3, *["local_flux"] * 3]
     head = ['"sep=\t"', "\t".join(names) + "\t", "\t".join(units) + "\t"]
-    columns = [1715941514123.0 + 1000 * m.t, *m.force.T, *m.deg.T, *(0.1 * m.g.T)]
-    return Right(rows(d / "Session1_Shimmer_8665_Calibrated_SD.csv", head, columns, "\t", end="\t"), (m.force,), 51.2, m.gyro)
+    columns = [1715941514123.0 + 1000 * m.t, *m.force.T, *m.deg.T, *(0.02 * m.field.T)]
+    return Right(
+        rows(d / "Session1_Shimmer_8665_Calibrated_SD.csv", head, columns, "\t", end="\t"), (m.force,), 51.2, m.gyro
+    )
 
 
 @shape("https://support.apdm.com (Moveo Explorer, Opal HDF5)")
@@ -79,7 +84,7 @@ def witmotion(d):
     m = motion()
     names = ["Time", "DeviceName", "AccX(g)", "AccY(g)", "AccZ(g)", "AsX(°/s)", "AsY(°/s)", "AsZ(°/s)"]
     names += ["AngleX(°)", "AngleY(°)", "AngleZ(°)", "HX(uT)", "HY(uT)", "HZ(uT)", "Temperature(°C)"]
-    columns = [stamps(m.t), ["WT901BLE68"] * len(m.t), *m.g.T, *m.deg.T, *(9 * m.gravity.T), *(4 * m.gravity.T), 0 * m.t + 31.2]
+    columns = [stamps(m.t), ["WT901BLE68"] * len(m.t), *m.g.T, *m.deg.T, *(9 * m.gravity.T), *m.field.T, 0 * m.t + 31.2]
     path = rows(d / "wit.txt", ["\t".join(names)], columns, "\t", "{:.4f}")
     return Right(path, (m.force,), 100.0, m.gyro, {"temperature_degC": 0 * m.t + 31.2})
 
@@ -119,7 +124,7 @@ def actigraph_imu(d):
         "--------------------------------------------------",
         "Timestamp,Accelerometer X,Accelerometer Y,Accelerometer Z,Temperature,Gyroscope X,Gyroscope Y,Gyroscope Z,Magnetometer X,Magnetometer Y,Magnetometer Z",
     ]
-    columns = [stamps(m.t, "{date}T{time}.{us}0"), *m.g.T, 0 * m.t + 29.5, *m.deg.T, *(3 * m.gravity.T)]
+    columns = [stamps(m.t, "{date}T{time}.{us}0"), *m.g.T, 0 * m.t + 29.5, *m.deg.T, *m.field.T]
     return Right(rows(d / "imu.csv", head, columns), (m.force,), 100.0, m.gyro, {"temperature_degC": 0 * m.t + 29.5})
 
 
@@ -127,12 +132,31 @@ def actigraph_imu(d):
 def geneactiv_csv(d):
     m = motion()
     pairs = [
-        "Device Type,GENEActiv", "Device Model,1.1", "Device Unique Serial Code,012967", "Measurement Frequency,100.0 Hz",
-        "Start Time,2024-05-17 10:25:14:000", "Time Zone,GMT +01:00", "Device Location Code,left wrist", "Calibration Date,2012-06-25",
-        "x gain,25475", "x offset,702", "y gain,25656", "y offset,-2242", "z gain,25465", "z offset,-1021", "Volts,300", "Lux,797",
+        "Device Type,GENEActiv",
+        "Device Model,1.1",
+        "Device Unique Serial Code,012967",
+        "Measurement Frequency,100.0 Hz",
+        "Start Time,2024-05-17 10:25:14:000",
+        "Time Zone,GMT +01:00",
+        "Device Location Code,left wrist",
+        "Calibration Date,2012-06-25",
+        "x gain,25475",
+        "x offset,702",
+        "y gain,25656",
+        "y offset,-2242",
+        "z gain,25465",
+        "z offset,-1021",
+        "Volts,300",
+        "Lux,797",
     ]
     head = [*pairs, *[""] * (100 - len(pairs))]
-    columns = [stamps(m.t, "{date} {time}:{ms}"), *m.g.T, np.zeros(len(m.t), int), np.zeros(len(m.t), int), ("{:.1f}", 0 * m.t + 26.3)]
+    columns = [
+        stamps(m.t, "{date} {time}:{ms}"),
+        *m.g.T,
+        np.zeros(len(m.t), int),
+        np.zeros(len(m.t), int),
+        ("{:.1f}", 0 * m.t + 26.3),
+    ]
     return Right(rows(d / "geneactiv.csv", head, columns, form="{:.4f}"), (m.force,), 100.0)
 
 
@@ -152,7 +176,7 @@ def pamap2(d):
     for chip in m.chips[:3]:
         second = chip + 0.05 * rng.standard_normal(chip.shape)
         forces += [chip, second]
-        columns += [0 * m.t + 30.375, *chip.T, *second.T, *m.gyro.T, *(15 + 4 * m.gravity.T)]
+        columns += [0 * m.t + 30.375, *chip.T, *second.T, *m.gyro.T, *m.field.T]
         columns += [[one] * len(m.t) for one in ("1.0", "0.0", "0.0", "0.0")]
     return Right(rows(d / "subject101.dat", [], columns, " "), tuple(forces), 100.0, m.gyro)
 
@@ -163,7 +187,7 @@ def mhealth(d):
     ecg = np.random.default_rng(0).normal(0, 0.1, (2, len(m.t)))
     columns = [*m.chips[0].T, *ecg]
     for chip in m.chips[1:3]:
-        columns += [*chip.T, *(m.gyro / np.max(np.abs(m.gyro))).T, *(0.3 * m.gravity.T)]
+        columns += [*chip.T, *(m.gyro / np.max(np.abs(m.gyro))).T, *m.field.T]
     columns += [np.zeros(len(m.t), int)]
     return Right(rows(d / "mHealth_subject1.log", [], columns, "\t", "{:.5g}"), m.chips[:3], None, doubt=True)
 
@@ -171,7 +195,7 @@ def mhealth(d):
 @shape("http://sistemic.udea.edu.co/en/research/projects/english-falls (SisFall)")
 def sisfall(d):
     m = motion(200.0, 8.0)
-    columns = [*counts(m.g, 256), *counts(m.deg, 14.375), *counts(m.chips[1] / G, 1024)]
+    columns = [*counts(m.g, 256), *counts(m.deg, 16.384), *counts(m.chips[1] / G, 1024)]
     columns = [[f"{one:4d}" for one in column] for column in columns]
     return Right(rows(d / "D01_SA01_R01.txt", [], columns, ",", end=";"), (m.chips[0], m.chips[1]), 200.0, m.gyro)
 
@@ -193,7 +217,13 @@ def daphnet(d):
 @shape("https://bids-specification.readthedocs.io (motion.tsv)")
 def bids_motion(d):
     m = motion(200.0, 8.0)
-    return Right(rows(d / "sub-01_tracksys-imu_motion.tsv", [], [*m.force.T, *m.gyro.T], "\t"), (m.force,), None, m.gyro, doubt=True)
+    return Right(
+        rows(d / "sub-01_tracksys-imu_motion.tsv", [], [*m.force.T, *m.gyro.T], "\t"),
+        (m.force,),
+        None,
+        m.gyro,
+        doubt=True,
+    )
 
 
 @shape("https://github.com/dlaidig/broad (HDF5)")
@@ -202,7 +232,7 @@ def broad_hdf5(d):
 
     m = motion(285.714, 6.0)
     with h5py.File(d / "01_undisturbed_slow_rotation_A.hdf5", "w") as file:
-        for name, values in (("imu_acc", m.force), ("imu_gyr", m.gyro), ("imu_mag", 4 * m.gravity)):
+        for name, values in (("imu_acc", m.force), ("imu_gyr", m.gyro), ("imu_mag", m.field)):
             file[name] = values
         file["movement"] = (m.t > 4.0).astype("i1")
         file["opt_quat"] = np.tile([1.0, 0, 0, 0], (len(m.t), 1)) + 0.01 * m.t[:, None]
@@ -215,6 +245,6 @@ def broad_matlab(d):
     from scipy.io import savemat
 
     m = motion(285.714, 6.0)
-    content = {"imu_acc": m.force, "imu_gyr": m.gyro, "imu_mag": 4 * m.gravity, "sampling_rate": 285.714}
+    content = {"imu_acc": m.force, "imu_gyr": m.gyro, "imu_mag": m.field, "sampling_rate": 285.714}
     savemat(d / "01_undisturbed_slow_rotation_A.mat", content)
     return Right(d / "01_undisturbed_slow_rotation_A.mat", (m.force,), 285.714, m.gyro)
