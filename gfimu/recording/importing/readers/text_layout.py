@@ -75,8 +75,10 @@ def layout_of(
     looked = list(lines[:_LOOKED_AT])
     quoted = any('"' in line for line in looked[-_QUOTED_AT:])
     best: tuple[tuple[int, float, int], Layout] | None = None
-    for mark in [_SEPARATORS.get(separator, separator)] if separator else _SEPARATORS.values():
-        for point in [decimal] if decimal else [".", ","]:
+    there = set().union(*looked)
+    marks = [one for one in _SEPARATORS.values() if one in there or one == " "]
+    for mark in [_SEPARATORS.get(separator, separator)] if separator else marks:
+        for point in [decimal] if decimal else [".", ","] if "," in there else ["."]:
             if point == mark and not quoted:
                 continue
             data = _data_lines(looked, mark, point, skip or 0)

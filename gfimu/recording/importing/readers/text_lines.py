@@ -25,8 +25,11 @@ _REMARK = re.compile(r"(?<=\d)\s*(?://|#)[^\"]*$")
 _COLOURS = re.compile(r"\x1b\[[\d;]*m")
 _TICK = re.compile(r"^\s*[IWEDV] \((\d+)\)")
 _UNIT = re.compile(r"\s*([A-Za-zµ°²%/^\d]{0,8})\s*$")
-_NUMBERS = re.compile(r"(?<![\w.+-])X(?:[\s,;]+X)+[\s,;]*$".replace("X", r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"))
-_PREFIX = re.compile(r"(?:(?<!\w)([A-Za-z]\w*)|[\])])\s*(?::|->|-|>|\|)\s*$")
+_PREFIXED = re.compile(
+    r"^(.{0,200}(?:(?<!\w)([A-Za-z]\w*)|[\])])\s*(?::|->|-|>|\|)\s*)(X(?:[\s,;]+X)+)[\s,;]*$".replace(
+        "X", r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+    )
+)
 _SECONDS = re.compile(r"\[\s*(\d+\.\d+)\]")
 _HOST = "host_time"
 _LABVIEW, _END = "LabVIEW Measurement", "***End_of_Header***"
@@ -92,22 +95,16 @@ def _without_prefixes(lines: list[str]) -> list[str]:
 
     Lines that begin with different words, as ``acc: 0.1 0.2 9.8``, have three named cells each.
     """
-    if not _most(lines, _NUMBERS):
+    if not _most(lines, _PREFIXED):
         return lines
-    plain, labels = list(lines), []
-    found: list[tuple[int, str, str, list[str]]] = []
-    for index, line in enumerate(lines):
-        run = _NUMBERS.search(line) if len(line) <= _LONGEST else None
-        prefix = _PREFIX.search(line[: run.start()]) if run else None
-        if run is not None and prefix is not None:
-            labels.append(prefix[1] or "")
-            found.append((index, _stamp(line[: run.start()]), labels[-1], re.split(r"[\s,;]+", run[0].strip(" ,;"))))
-    if len(found) <= _LEAST * sum(bool(line.strip()) for line in lines):
-        return lines
-    several = 1 < len(set(labels)) <= _MOST_LABELS and all(len(cells) == 3 for *_, cells in found)
-    for index, stamp, label, numbers in found:
-        named = [f"{label} {axis}: {cell}" for axis, cell in zip("XYZ", numbers, strict=True)] if several else numbers
-        plain[index] = ",".join([stamp, *named] if stamp else named)
+    found = {k: one for k, line in enumerate(lines) if len(line) <= _LONGEST and (one := _PREFIXED.match(line))}
+    several = 1 < len({one[2] for one in found.values()}) <= _MOST_LABELS
+    plain = list(lines)
+    for place, one in found.items():
+        stamp, cells = _stamp(one[1]), re.split(r"[\s,;]+", one[3])
+        if several and len(cells) == 3:
+            cells = [f"{one[2]} {axis}: {cell}" for axis, cell in zip("XYZ", cells, strict=True)]
+        plain[place] = ",".join([stamp, *cells] if stamp else cells)
     return plain
 
 

@@ -20,13 +20,11 @@ def matlab_matrix(d):
     return Right(d / "accel.mat", (m.force,), 100.0)
 
 
-@shape(SCIPY)
-def matlab_matrix_lying(d):
-    from scipy.io import savemat
-
+@shape(NUMPY)
+def npz_matrix_lying(d):
     m = motion()
-    savemat(d / "accel.mat", {"data": np.column_stack([m.t, m.force, m.gyro]).T})
-    return Right(d / "accel.mat", (m.force,), 100.0, m.gyro)
+    np.savez(d / "accel.npz", data=np.column_stack([m.t, m.force, m.gyro]).T)
+    return Right(d / "accel.npz", (m.force,), 100.0, m.gyro)
 
 
 @shape(SCIPY)

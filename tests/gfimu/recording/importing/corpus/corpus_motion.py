@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,7 @@ PLACES_M = 0.05 * np.array([(1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)])
 
 @dataclass(frozen=True)
 class Motion:
-    """Times (n,), s, readings of four chips (n, 3) each, m/s², rates (n, 3), rad/s, gravity (n, 3), m/s², and a magnetic field (n, 3), µT."""
+    """Times (n,), s; (n, 3) each: readings of four chips and gravity, m/s², rates, rad/s, a magnetic field, µT."""
 
     t: np.ndarray
     chips: tuple[np.ndarray, ...]
@@ -39,7 +40,8 @@ class Motion:
         return np.degrees(self.gyro)
 
 
-def motion(rate: float = 100.0, seconds: float = 12.0, seed: int = 8) -> Motion:
+@cache
+def motion(rate: float = 100.0, seconds: float = 10.0, seed: int = 8) -> Motion:
     """Return the motion: a quarter of its time at rest, a half in six poses, then by hand."""
     rng = np.random.default_rng(seed)
     t = np.arange(round(rate * seconds)) / rate
@@ -116,7 +118,7 @@ def shape(source: str) -> Callable[[Callable[[Path], Right]], Callable[[Path], R
 def rows(
     path, head, columns, separator=",", form="{:.6f}", end="", tail=(), line="\n", code="utf-8", mark=".", start=""
 ):
-    """Write lines of columns; whole numbers and texts as they are; a column may bring its own form as (form, values)."""
+    """Write lines of columns; whole numbers and texts as they are; a column may bring its form as (form, values)."""
 
     def texts(column):
         own, values = column if isinstance(column, tuple) else (form, column)

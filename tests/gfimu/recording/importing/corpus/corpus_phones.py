@@ -15,7 +15,10 @@ PHYPHOX = "https://phyphox.org/wiki/index.php/Export_data_formats"
 def phyphox_csv(d):
     m = motion()
     head = [
-        '"Time (s)","Acceleration x (m/s^2)","Acceleration y (m/s^2)","Acceleration z (m/s^2)","Absolute acceleration (m/s^2)"'
+        (
+            '"Time (s)","Acceleration x (m/s^2)","Acceleration y (m/s^2)","Acceleration z (m/s^2)",'
+            '"Absolute acceleration (m/s^2)"'
+        )
     ]
     columns = [m.t + 0.0123, *m.force.T, np.linalg.norm(m.force, axis=1)]
     return Right(rows(d / "Raw Data.csv", head, columns, form="{:.9E}"), (m.force,), 100.0)
@@ -25,7 +28,10 @@ def phyphox_csv(d):
 def phyphox_without_gravity(d):
     m = motion()
     head = [
-        '"Time (s)","Linear Acceleration x (m/s^2)","Linear Acceleration y (m/s^2)","Linear Acceleration z (m/s^2)","Absolute acceleration (m/s^2)"'
+        (
+            '"Time (s)","Linear Acceleration x (m/s^2)","Linear Acceleration y (m/s^2)",'
+            '"Linear Acceleration z (m/s^2)","Absolute acceleration (m/s^2)"'
+        )
     ]
     linear = m.force - m.gravity
     path = rows(d / "Raw Data.csv", head, [m.t, *linear.T, np.linalg.norm(linear, axis=1)], form="{:.9E}")
@@ -36,7 +42,10 @@ def phyphox_without_gravity(d):
 def phyphox_semicolons_decimal_comma(d):
     m = motion()
     head = [
-        '"Time (s)";"Acceleration x (m/s^2)";"Acceleration y (m/s^2)";"Acceleration z (m/s^2)";"Absolute acceleration (m/s^2)"'
+        (
+            '"Time (s)";"Acceleration x (m/s^2)";"Acceleration y (m/s^2)";"Acceleration z (m/s^2)";'
+            '"Absolute acceleration (m/s^2)"'
+        )
     ]
     columns = [m.t, *m.force.T, np.linalg.norm(m.force, axis=1)]
     return Right(rows(d / "Raw Data.csv", head, columns, ";", "{:.9E}", mark=","), (m.force,), 100.0)

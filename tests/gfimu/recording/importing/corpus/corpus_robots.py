@@ -144,7 +144,8 @@ def px4_sensor_combined(d):
 @shape("https://github.com/PX4/pyulog (ulog2csv, sensor_accel)")
 def px4_sensor_accel(d):
     m = motion(200.0, 6.0)
-    names = "timestamp,timestamp_sample,device_id,x,y,z,temperature,error_count,clip_counter[0],clip_counter[1],clip_counter[2],samples"
+    names = "timestamp,timestamp_sample,device_id,x,y,z,temperature,error_count,"
+    names += "clip_counter[0],clip_counter[1],clip_counter[2],samples"
     stamp = np.round(31_412_345 + 1e6 * m.t).astype(int)
     still = [np.full(len(m.t), k) for k in (2_490_378, 0, 0, 0, 0, 1)]
     columns = [stamp, stamp - 312, still[0], *m.force.T, 0 * m.t + 44.125, *still[1:]]

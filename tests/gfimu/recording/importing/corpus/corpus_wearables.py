@@ -99,7 +99,10 @@ def axivity_csv(d):
 def actigraph_raw(d):
     m = motion(30.0, 20.0)
     head = [
-        "------------ Data File Created By ActiGraph GT3X+ ActiLife v6.13.3 Firmware v2.5.0 date format M/d/yyyy at 30 Hz  Filter Normal -----------",
+        (
+            "------------ Data File Created By ActiGraph GT3X+ ActiLife v6.13.3 Firmware v2.5.0 "
+            "date format M/d/yyyy at 30 Hz  Filter Normal -----------"
+        ),
         "Serial Number: CLE2B21130054",
         "Start Time 10:25:14",
         "Start Date 5/17/2024",
@@ -118,11 +121,17 @@ def actigraph_raw(d):
 def actigraph_imu(d):
     m = motion()
     head = [
-        "------------ Data Table File Created By ActiGraph GT9X Link ActiLife v6.13.3 Firmware v1.7.1 date format M/d/yyyy at 100 Hz -----------",
+        (
+            "------------ Data Table File Created By ActiGraph GT9X Link ActiLife v6.13.3 Firmware v1.7.1 "
+            "date format M/d/yyyy at 100 Hz -----------"
+        ),
         "Serial Number: TAS1F04180054",
         "Start Time 10:25:14",
         "--------------------------------------------------",
-        "Timestamp,Accelerometer X,Accelerometer Y,Accelerometer Z,Temperature,Gyroscope X,Gyroscope Y,Gyroscope Z,Magnetometer X,Magnetometer Y,Magnetometer Z",
+        (
+            "Timestamp,Accelerometer X,Accelerometer Y,Accelerometer Z,Temperature,"
+            "Gyroscope X,Gyroscope Y,Gyroscope Z,Magnetometer X,Magnetometer Y,Magnetometer Z"
+        ),
     ]
     columns = [stamps(m.t, "{date}T{time}.{us}0"), *m.g.T, 0 * m.t + 29.5, *m.deg.T, *m.field.T]
     return Right(rows(d / "imu.csv", head, columns), (m.force,), 100.0, m.gyro, {"temperature_degC": 0 * m.t + 29.5})
