@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -40,13 +41,13 @@ class Gathered:
     def add(self, name: str, value: Any) -> None:
         """Collect a value: a vector, a matrix, a structure or a list of them; a single number or a text as a line."""
         if isinstance(value, list) and value and all(isinstance(one, Mapping) for one in value):
-            shared = [key for key in value[0] if all(key in one and np.size(one[key]) == 1 for one in value)]
-            records = {key: np.array([np.squeeze(one[key]) for one in value]) for key in shared}
-            further = {
-                f"{place}": {key: part for key, part in one.items() if key not in records}
-                for place, one in enumerate(value, start=1)
+            by_key = {key: [np.asarray(one.get(key)) for one in value] for key in value[0]}
+            alike = {key for key, parts in by_key.items() if len({part.shape for part in parts}) == 1}
+            stacked = {key for key in alike if by_key[key][0].size < len(value)}
+            value = {
+                key: np.stack(parts) if key in stacked else dict(zip(map(str, itertools.count(1)), parts, strict=False))
+                for key, parts in by_key.items()
             }
-            value = {**records, **further}
         if isinstance(value, Mapping):
             for key, item in value.items():
                 self.add(f"{name}.{key}".lstrip("."), item)

@@ -121,12 +121,12 @@ def upright(lines: Sequence[str]) -> list[str]:
     filled = [line for line in lines if line.strip() and line.lstrip()[0] not in COMMENT_MARKS]
     if len(filled) < 2:
         return list(lines)
-    mark = max(_SEPARATORS.values(), key=lambda one: len(cells_of(filled[0], one)))
+    mark = max(_SEPARATORS.values(), key=lambda one: len(cells_of(filled[-1], one)))
     rows = [cells_of(line, mark) for line in filled]
     width = len(rows[-1])
     rows = [row for row in rows if len(row) == width]
     named = not any(_is_datum(row[0]) for row in rows)
-    if width < (1 if named else _FLAT) * max(_LEAST_FLAT, len(rows)) or 2 * len(rows) < len(filled):
+    if width - named < (1 if named else _FLAT) * max(_LEAST_FLAT, len(rows)) or 2 * len(rows) < len(filled):
         return list(lines)
     if not all(_is_datum(row[1]) for row in rows):
         return list(lines)  # a line of names above

@@ -104,7 +104,7 @@ def _without_prefixes(lines: list[str]) -> list[str]:
         stamp, cells = _stamp(one[1]), re.split(r"[\s,;]+", one[3])
         if several and len(cells) == 3:
             cells = [f"{one[2]} {axis}: {cell}" for axis, cell in zip("XYZ", cells, strict=True)]
-        plain[place] = ",".join([stamp, *cells] if stamp else cells)
+        plain[place] = ";".join([stamp, *cells] if stamp else cells)
     return plain
 
 
