@@ -71,7 +71,7 @@ class Gathered:
             by_length.setdefault(len(rows), {})[name] = rows
         tables = []
         for length, group in by_length.items():
-            named = len(group) > 1
+            named = len(group) > 1 or next(iter(group.values())).shape[1] == 1
             columns = {
                 f"{name}_{place}" if rows.shape[1] > 1 and named else name if named else f"column_{place}": column
                 for name, rows in group.items()

@@ -187,7 +187,7 @@ def rosconsole_log(d):
     return Right(lines(d / "rosout.log", [], made), (m.force,), 100.0)
 
 
-@shape("https://github.com/kriswiner/MPU9250 (serial output)")
+@shape("own: lines of two sensors in turn")
 def two_sensors_in_turn(d):
     m = motion()
     made = []
@@ -241,12 +241,12 @@ def circuitpython_tuples(d):
     return Right(lines(d / "mu.txt", [], made), (m.force,), 100.0)
 
 
-@shape("https://www.nordicsemi.com (Thingy:52, web logger)")
-def thingy52(d):
+@shape("own: epoch in ms, decimal commas")
+def epoch_decimal_commas(d):
     m = motion(50.0)
     head = ["timestamp;acc_x [g];acc_y [g];acc_z [g];gyro_x [deg/s];gyro_y [deg/s];gyro_z [deg/s]"]
     columns = [ms(m.t, 1_715_941_514_123), *m.g.T, *m.deg.T]
-    return Right(rows(d / "thingy.csv", head, columns, ";", "{:.4f}", mark=","), (m.force,), 50.0, m.gyro)
+    return Right(rows(d / "log.csv", head, columns, ";", "{:.4f}", mark=","), (m.force,), 50.0, m.gyro)
 
 
 @shape("https://github.com/boschsensortec/COINES_SDK (example log)")
@@ -277,7 +277,7 @@ def gulf_coast(d):
     return Right(rows(d / "DATA-001.CSV", head, [m.t, *counts(m.g, 2048)]), (m.force,), 200.0)
 
 
-@shape("https://www.arduino.cc (array of four ADXL345, 12 channels)")
+@shape("own: four ADXL345, counts")
 def twelve_axes(d):
     m = motion()
     names = ["ms"] + [f"a{chip}{a}" for chip in range(1, 5) for a in "xyz"]
@@ -285,7 +285,7 @@ def twelve_axes(d):
     return Right(rows(d / "array.csv", [",".join(names)], columns), m.chips, 100.0)
 
 
-@shape("https://www.arduino.cc (two sensors, long table)")
+@shape("own: a row per sensor")
 def long_table(d):
     m = motion()
     order = np.argsort(np.concatenate([m.t, m.t + 0.001]), kind="stable")
@@ -295,7 +295,7 @@ def long_table(d):
     return Right(path, m.chips[:2], 100.0)
 
 
-@shape("https://www.arduino.cc (accelerometer with an encoder)")
+@shape("own: a rig with an encoder")
 def encoder_and_rpm(d):
     m = motion()
     angle, speed = np.degrees(np.cumsum(m.gyro[:, 2]) / 100.0), m.gyro[:, 2] * 30.0 / np.pi

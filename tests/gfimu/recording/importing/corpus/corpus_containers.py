@@ -188,7 +188,7 @@ def csv_xz(d):
     return Right(d / "run.csv.xz", (m.force,), 100.0)
 
 
-@shape("https://support.microsoft.com (a sheet transposed, saved as CSV)")
+@shape("own: a line per series")
 def transposed(d):
     m = motion(50.0)
     series = {"time [s]": m.t, "ax [m/s^2]": m.force[:, 0], "ay [m/s^2]": m.force[:, 1], "az [m/s^2]": m.force[:, 2]}

@@ -284,7 +284,7 @@ def msr_logger(d):
     return Right(rows(d / "msr.csv", head, [stamps(m.t), *m.g.T], ";", "{:.3f}"), (m.force,), 50.0)
 
 
-@shape("https://www.pcb.com (Digiducer through Audacity, sample data export)")
+@shape("own: totals below the rows")
 def counts_with_totals(d):
     m = motion(200.0, 6.0)
     tail = ["", "Samples,1200,,", "Mean,0.1,0.2,9.8", "# end"]
@@ -292,7 +292,7 @@ def counts_with_totals(d):
     return Right(path, (m.force,), 200.0)
 
 
-@shape("https://www.analog.com (EVAL-ADXL355, 12 axes in mg)")
+@shape("own: twelve axes in mg")
 def evaluation_board_mg(d):
     m = motion(125.0)
     names = ["Time [ms]"] + [f"S{chip}_{a} [mg]" for chip in range(1, 5) for a in "XYZ"]

@@ -103,6 +103,48 @@ class Shape:
 
 
 SHAPES: dict[str, Shape] = {}
+SEEN = frozenset(
+    [
+        "phyphox_csv",
+        "phyphox_without_gravity",
+        "sensor_logger_total_acceleration",
+        "sensor_logger_zip",
+        "sensorlog_ios",
+        "androsensor",
+        "android_sensor_logger",
+        "xsens_mtw",
+        "xsens_dot",
+        "xsens_dot_free_acceleration",
+        "shimmer_consensys",
+        "mbientlab",
+        "witmotion",
+        "actigraph_raw",
+        "empatica_e4",
+        "ronin_hdf5",
+        "klipper",
+        "reprapfirmware",
+        "betaflight",
+        "betaflight_units",
+        "ardupilot_csv",
+        "ardupilot_log",
+        "px4_sensor_combined",
+        "rostopic_csv",
+        "unico",
+        "unicleo",
+        "hsdatalog_csv",
+        "zephyr_lis2dh",
+        "labview_one_x",
+        "labview_segments_without_x",
+        "catman_ascii",
+        "vibrometra",
+        "tspair",
+        "peer_at2",
+        "knet_ascii",
+        "vernier_text",
+    ]
+)
+"""Shapes whose head was compared with public files, or with programs that write or read them; others follow the
+documentation of their source."""
 
 
 def shape(source: str) -> Callable[[Callable[[Path], Right]], Callable[[Path], Right]]:

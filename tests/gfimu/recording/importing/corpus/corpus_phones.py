@@ -179,8 +179,8 @@ def advio_accelerometer(d):
     return Right(rows(d / "accelerometer.csv", [], [m.t + 0.1, *m.force.T]), (m.force,), 100.0)
 
 
-@shape("https://www.mathworks.com/help/matlabmobile (positions of a struct per sensor)")
-def matlab_mobile_struct(d):
+@shape("own: a MATLAB struct per sensor")
+def matlab_struct_per_sensor(d):
     from scipy.io import savemat
 
     m = motion()

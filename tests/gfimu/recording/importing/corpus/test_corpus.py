@@ -8,7 +8,7 @@ import corpus_robots  # noqa: F401
 import corpus_wearables  # noqa: F401
 import pytest
 from corpus_judge import judge
-from corpus_motion import SHAPES
+from corpus_motion import SEEN, SHAPES
 
 LEAST_RIGHT, MOST_SILENT = 0.90, 0.02  # shares of the shapes
 RANK = ("silent", "marked", "right")
@@ -62,5 +62,11 @@ def test_nine_of_ten_are_right_and_hardly_one_wrong_in_silence():
     assert sum(kind == "silent" for kind in LESS.values()) / count <= MOST_SILENT
 
 
-def test_each_shape_has_a_source():
-    assert all(one.source.startswith("http") for one in SHAPES.values())
+def test_the_page_lists_each_shape_with_its_source(project_root):
+    page = (project_root / "docs" / "reference" / "foreign-formats.md").read_text(encoding="utf-8")
+    assert set(SHAPES) >= SEEN
+    for one in SHAPES.values():
+        assert one.source.startswith(("http", "own: "))
+        (row,) = [line for line in page.splitlines() if line.startswith(f"| `{one.name}` |")]
+        assert one.source.split()[0].removeprefix("own:") in row
+        assert row.endswith("| yes |") == (one.name in SEEN)
