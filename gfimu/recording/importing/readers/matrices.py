@@ -21,8 +21,8 @@ from gfimu.recording.reading import parsing
 __all__ = ["Gathered", "is_gathered", "read_numpy"]
 
 _MOST_COLUMNS = 64  # of one matrix: what has more is no table of samples
-_LONGEST_WORDS = 200  # characters of a text that may state something about the samples
-_MOST_LINES = 100  # of what is stated
+_LONGEST_WORDS = 200  # numerical: characters of a text that may state something about the samples
+_MOST_LINES = 100  # numerical: of what is stated
 
 
 def is_gathered(shape: Sequence[int]) -> bool:

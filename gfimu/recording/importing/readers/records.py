@@ -28,7 +28,7 @@ from gfimu.recording.reading import parsing, read_bytes
 __all__ = ["read_excel", "read_json"]
 
 _LEAST_ROWS = 3
-_MOST_LINES, _LONGEST_WORDS = 100, 200  # of what is stated beside the readings, characters of each
+_MOST_LINES, _LONGEST_WORDS = 100, 200  # numerical: of what is stated beside the readings, characters of each
 _LEAST_SHARE, _SAME_KIND = 0.1, 0.7  # of the rows of the most frequent kind of records; of the keys of one
 _MOST_CELLS = 64  # of a list in a record: what has more is no sample
 _GROWS: Mapping[bytes, int] = {b"{": 280, b"[": 100, b",": 48, b":": 62}

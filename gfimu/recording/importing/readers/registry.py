@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import zipfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +18,7 @@ from gfimu.recording.importing.readers.logs import read_bag, read_mcap, read_ulo
 from gfimu.recording.importing.readers.matlab import read_matlab
 from gfimu.recording.importing.readers.matrices import read_numpy
 from gfimu.recording.importing.readers.records import read_excel, read_json
-from gfimu.recording.importing.readers.tables import read_archive, read_arrow, read_parquet
+from gfimu.recording.importing.readers.tables import archive_format, read_archive, read_arrow, read_parquet
 from gfimu.recording.importing.readers.text import is_text, read_text
 from gfimu.recording.reading import first_unpacked
 
@@ -101,38 +100,18 @@ def format_of(path: Path) -> str:
         size = pointer[1].decode()
         raise InputError(f"{path}: a Git LFS pointer of a file of {size} bytes; fetch it with git lfs pull")
     head = first_unpacked(packed)
-    name = _format_of_bytes(path, head)
+    plain = head.removeprefix(b"\xef\xbb\xbf").lstrip() if head.lstrip()[:1] in {b"{", b"["} else head
+    known = readers()
+    marked = (name for name, reader in known.items() if reader.marks and plain.startswith(reader.marks))
+    name = next(marked, "text" if is_text(head) else "")
+    if not name:
+        unknown = f"a binary file of unknown format; known are {', '.join(known)}"
+        raise InputError(
+            f"{path}: {next((what for what, marks in _NOT_READ.items() if head.startswith(marks)), unknown)}"
+        )
     if head is not packed and name not in _PACKABLE:
         raise InputError(f"{path}: a packed {name} file; unpack it")
-    return _format_of_archive(path) if name == "zip" else name
-
-
-def _format_of_bytes(path: Path, head: bytes) -> str:
-    known = readers()
-    plain = head.removeprefix(b"\xef\xbb\xbf").lstrip() if head.lstrip()[:1] in {b"{", b"["} else head
-    for name, reader in known.items():
-        if reader.marks and plain.startswith(reader.marks):
-            return name
-    if is_text(head):
-        return "text"
-    for what, marks in _NOT_READ.items():
-        if head.startswith(marks):
-            raise InputError(f"{path}: {what}")
-    raise InputError(f"{path}: a binary file of unknown format; known are {', '.join(known)}")
-
-
-def _format_of_archive(path: Path) -> str:
-    """Return the format of a zip archive by the names of what is in it."""
-    try:
-        with zipfile.ZipFile(path) as archive:
-            names = archive.namelist()
-    except (zipfile.BadZipFile, OSError, ValueError, RuntimeError):  # also of a version that is not implemented
-        return "zip"
-    if "content.xml" in names:
-        raise InputError(f"{path}: an OpenDocument spreadsheet; save it as .xlsx or .csv")
-    if any(name.startswith("xl/") for name in names):
-        return "excel"
-    return "numpy" if names and all(name.endswith(".npy") for name in names) else "zip"
+    return archive_format(path) if name == "zip" else name
 
 
 def read_foreign(path: str | Path, kind: str = "", text: TextSpec = TextSpec()) -> RawFile:

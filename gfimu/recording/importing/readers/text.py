@@ -31,10 +31,10 @@ _THOUSANDS = r"\.(\d{3})"  # a point between groups of digits, where a comma is 
 _NO_NUMBER = ["", "nan", "-nan", "+nan", "na", "n/a", "null", "none", "-"]
 _INFINITE = r"^[+-]?inf(inity)?$"
 _IS_NUMBERS = 0.5  # of the filled cells of a column
-_MOST_PREAMBLE = 100  # lines
+_MOST_PREAMBLE = 100  # numerical: lines
 _HEAD_LINES = 600  # by which the layout is found, and the preamble
-_LAST = 4000  # characters in which lines after the numbers are looked for
-_MOST_SERIES = 64  # lines of a file that may have a column per line
+_LAST = 4000  # numerical: characters in which lines after the numbers are looked for
+_MOST_SERIES = 64  # numerical: lines of a file that may have a column per line, as columns of a matrix
 _LOSSES = "(?:overflow|overrun|dropped|lost|missed)"
 _LOST = re.compile(rf"{_LOSSES}\w*\W{{0,4}}[1-9]\d*|\b[1-9]\d* (?:samples? )?{_LOSSES}\w*", re.IGNORECASE)
 _BLOCK = 8_000_000  # numerical: characters that are cut into lines at once
@@ -62,7 +62,7 @@ def table_of_text(data: bytes, source: str, text: TextSpec = TextSpec(), limit: 
     del data
     if not content.strip():
         raise InputError(f"{source}: empty file; record again or give another file")
-    if content.count("\n") <= _MOST_SERIES:
+    if len(content) <= _BLOCK and content.count("\n") <= _MOST_SERIES:
         content = "\n".join(upright(content.split("\n")))
     head, rest = _first_lines(content)
     _check_widths(head, source)

@@ -13,9 +13,6 @@ from gfimu.recording.importing.notation import kind_of, unit_of_name
 __all__ = ["COMMENT_MARKS", "Layout", "cells_of", "layout_of", "trailer", "upright"]
 
 COMMENT_MARKS = "#;%/*"
-_LONGEST_CELL = 100  # characters of a number or time
-_LOOKED_AT = 400  # lines
-_QUOTED_AT = 20  # of these, at the end, that show whether numbers stand in quotes
 _SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " "}
 _NUMBER = {
     ".": re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE),
@@ -25,10 +22,23 @@ _NUMBER = {
 }
 _STAMP = re.compile(r"(\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4})?[T _]*(\d{1,2}:\d\d(:\d\d([.,:]\d+)?)?)?\s*([AaPp][Mm]|Z)?")
 _NOTHING = re.compile(r"n/?a|null|none|-", re.IGNORECASE)
-_FLAT, _LEAST_FLAT = 5, 20  # numbers per line, of those without a name times the lines, where each line is a column
-_MOST_LAST = 20  # lines after the numbers
-_LEAST_NUMBERS = 0.5  # of the cells of a line of data
 _NO_UNITS = {"", "-", "1", "raw", "cal", "counts", "lsb", "%", "mv", "v", "ut", "gauss", "hpa", "pa", "local_flux"}
+
+
+@dataclass(frozen=True)
+class LayoutPolicy:
+    """Thresholds by which the layout of a text file is found; each by choice."""
+
+    looked_at: int = 400  # lines
+    quoted_at: int = 20  # of these, at the end, that show whether numbers stand in quotes
+    longest_cell: int = 100  # characters of a number or time
+    least_numbers: float = 0.5  # of the filled cells of a line of data
+    least_flat: int = 20  # numbers of a line with a name before them, from which each line is a column
+    flat: int = 5  # times the lines: numbers of lines without names, from which each line is a column
+    most_last: int = 20  # lines after the numbers
+
+
+_POLICY = LayoutPolicy()
 
 
 @dataclass(frozen=True)
@@ -72,8 +82,8 @@ def layout_of(
     names : sequence of str
         Known names of the columns.
     """
-    looked = list(lines[:_LOOKED_AT])
-    quoted = any('"' in line for line in looked[-_QUOTED_AT:])
+    looked = list(lines[: _POLICY.looked_at])
+    quoted = any('"' in line for line in looked[-_POLICY.quoted_at :])
     best: tuple[tuple[int, float, int], Layout] | None = None
     there = set().union(*looked)
     marks = [one for one in _SEPARATORS.values() if one in there or one == " "]
@@ -126,7 +136,9 @@ def upright(lines: Sequence[str]) -> list[str]:
     width = len(rows[-1])
     rows = [row for row in rows if len(row) == width]
     named = not any(_is_datum(row[0]) for row in rows)
-    if width - named < (1 if named else _FLAT) * max(_LEAST_FLAT, len(rows)) or 2 * len(rows) < len(filled):
+    if width - named < (1 if named else _POLICY.flat) * max(_POLICY.least_flat, len(rows)) or 2 * len(rows) < len(
+        filled
+    ):
         return list(lines)
     if not all(_is_datum(row[1]) for row in rows):
         return list(lines)  # a line of names above
@@ -138,7 +150,7 @@ def trailer(last: Sequence[str], row: str, layout: Layout) -> list[str]:
     """Return the lines after the numbers that state something: words in them where a row has numbers."""
     pattern = [_is_datum(cell) for cell in cells_of(row, layout.separator)]
     found: list[str] = []
-    for line in reversed(last[-_MOST_LAST:]):
+    for line in reversed(last[-_POLICY.most_last :]):
         cells = cells_of(line, layout.separator)
         is_row = len(cells) == len(pattern) and all(
             _is_datum(cell) or not known for cell, known in zip(cells, pattern, strict=True)
@@ -151,7 +163,7 @@ def trailer(last: Sequence[str], row: str, layout: Layout) -> list[str]:
 
 def _is_datum(cell: str) -> bool:
     """Whether a cell may be one of a row of numbers: a number with either decimal mark, a date or time, or nothing."""
-    plain = cell.strip('"')[:_LONGEST_CELL]
+    plain = cell.strip('"')[: _POLICY.longest_cell]
     return any(one.fullmatch(plain) for one in (*_NUMBER.values(), _STAMP, _NOTHING))
 
 
@@ -164,8 +176,8 @@ def _data_lines(lines: Sequence[str], separator: str, decimal: str, skip: int) -
             continue
         cells = cells_of(line, separator)
         filled = [cell for cell in cells if cell]
-        numeric = sum(len(cell) <= _LONGEST_CELL and number.fullmatch(cell) is not None for cell in filled)
-        if numeric and numeric >= _LEAST_NUMBERS * len(filled):
+        numeric = sum(len(cell) <= _POLICY.longest_cell and number.fullmatch(cell) is not None for cell in filled)
+        if numeric and numeric >= _POLICY.least_numbers * len(filled):
             found.append((index, cells))
     return found
 
@@ -173,7 +185,7 @@ def _data_lines(lines: Sequence[str], separator: str, decimal: str, skip: int) -
 def _share_read(lines: Sequence[Sequence[str]], decimal: str) -> float:
     """Return which share of the filled cells are numbers, dates or times of day, to a hundredth."""
     filled = [cell for cells in lines for cell in cells if cell]
-    short = [cell for cell in filled if len(cell) <= _LONGEST_CELL]
+    short = [cell for cell in filled if len(cell) <= _POLICY.longest_cell]
     read = sum(_NUMBER[decimal].fullmatch(cell) is not None or _STAMP.fullmatch(cell) is not None for cell in short)
     return round(read / max(len(filled), 1), 2)
 

@@ -110,21 +110,19 @@ def _without_prefixes(lines: list[str]) -> list[str]:
 
 def _of_labview(lines: Sequence[str]) -> list[str]:
     """Return the names, units and rows of all segments of a LabVIEW measurement file; its rate as a comment."""
-    fields = {line.split("\t")[0]: line.split("\t")[1:] for line in lines[:_LOOKED_AT]}
-    ends = [place for place, line in enumerate(lines) if line.startswith(_END)]
-    names, rows = "", []
-    for place, after in zip(ends[1:], [*ends[2:], len(lines)], strict=True):
-        names = lines[place + 1].removesuffix("\tComment") if place + 1 < after else names
-        segment = lines[place + 2 : after]
-        rows += segment[: next((number for number, line in enumerate(segment) if not line.strip()), after)]
+    fields = {cells[0]: cells[1:] for cells in (line.split("\t") for line in lines[:_LOOKED_AT])}
+    rows: list[str] = []
+    names = ""
+    for segment in "\n".join(lines).split(_END)[2:]:
+        names, *body = segment.split("\n")[1:] or [names]
+        rows += itertools.takewhile(str.strip, body)
+    names = names.removesuffix("\tComment")
     width = names.count("\t") + 1
-    rows = ["\t".join(line.split("\t")[:width]) for line in rows]
-    steps = fields.get("Delta_X", ["0"])[0].replace(",", ".")
-    rate = (
-        [f"# sample rate {1.0 / float(steps):.9g} Hz"] if re.fullmatch(r"[\d.]*[1-9][\d.]*(E[+-]\d+)?", steps) else []
-    )
     units = "\t".join(["s", *fields.get("Y_Unit_Label", [])[: width - 1]])
-    return [*rate, names, units, *rows] if rows else list(lines)
+    step = re.fullmatch(r"\d{1,9}[.,]?\d{0,16}(E[+-]?\d\d?)?", fields.get("Delta_X", [""])[0])
+    period = float(step[0].replace(",", ".")) if step else 0.0
+    rate = [f"# sample rate {1.0 / period:.9g} Hz"] if period else []
+    return [*rate, names, units, *("\t".join(line.split("\t")[:width]) for line in rows)] if rows else list(lines)
 
 
 def _without_labels(lines: list[str]) -> list[str]:

@@ -253,3 +253,25 @@ def test_a_recording_in_json_is_converted_by_the_map_that_inspect_prints(tmp_pat
         recording = gfimu.convert(tmp_path / name, tmp_path / "run.csv", column_map=tmp_path / "map.toml")
         assert found.chips == 1, name
         assert np.allclose(recording.readings, FORCE, atol=1e-9), name
+
+
+@pytest.mark.parametrize("step", ["0", "1E-999", "1.2.3", "", "-0.02"])
+def test_a_labview_file_without_a_period_states_no_rate(tmp_path, step):
+    lines = ["LabVIEW Measurement", "***End_of_Header***", f"Delta_X\t{step}", "***End_of_Header***", "X_Value\tax"]
+    (tmp_path / "run.lvm").write_text(
+        "\n".join([*lines, *(f"{t:.3f}\t{x:.4f}" for t, x in zip(T, FORCE[:, 0], strict=True))])
+    )
+    assert not any("sample rate" in line for line in only(tmp_path / "run.lvm").preamble)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_a_labview_file_without_rows_is_one_line(tmp_path, count):
+    (tmp_path / "run.lvm").write_text("LabVIEW Measurement\n" + "***End_of_Header***" * count)
+    with pytest.raises(InputError, match="no line holds numbers"):
+        read_foreign(tmp_path / "run.lvm")
+
+
+def test_a_map_that_was_made_for_json_reads_json_and_a_calibration_needs_none(tmp_path):
+    (tmp_path / "cal.json").write_text("{}")
+    with pytest.raises(InputError, match="not a calibration file"):
+        gfimu.convert(tmp_path / "cal.json")

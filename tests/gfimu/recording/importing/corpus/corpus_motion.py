@@ -104,7 +104,7 @@ class Shape:
 
 SHAPES: dict[str, Shape] = {}
 SEEN = frozenset(
-    [
+    {
         "phyphox_csv",
         "phyphox_without_gravity",
         "sensor_logger_total_acceleration",
@@ -141,7 +141,7 @@ SEEN = frozenset(
         "peer_at2",
         "knet_ascii",
         "vernier_text",
-    ]
+    }
 )
 """Shapes whose head was compared with public files, or with programs that write or read them; others follow the
 documentation of their source."""
