@@ -228,7 +228,9 @@ def convert(
             write_text(target, text)
         return drawn
     drawing = None if array is None else as_array(array)
-    if isinstance(alone, Calibration) or (isinstance(alone, str | Path) and Path(alone).suffix == ".json"):
+    if isinstance(alone, Calibration) or (
+        isinstance(alone, str | Path) and Path(alone).suffix == ".json" and not column_map
+    ):
         from gfimu.calibration.exporting import TARGETS, calibrated_chips, notes_of
         from gfimu.commands.noise import noise as recorded_noise
         from gfimu.sensor_noise import RecordingNoise

@@ -7,19 +7,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gfimu.base.errors import InputError
 from gfimu.base.files.memory import MemoryLimit
 from gfimu.base.optional_packages import require
 from gfimu.recording.importing.column_map import TextSpec
 from gfimu.recording.importing.raw_table import RawFile
-from gfimu.recording.importing.readers.matrices import gather, is_gathered, tables_by_length
+from gfimu.recording.importing.readers.matrices import Gathered, is_gathered
 from gfimu.recording.reading import parsing
 
 __all__ = ["read_hdf5"]
 
 _FILTERS = {1, 2, 3, 4, 5, 6, 32000}  # of HDF5 itself, and the LZF of h5py; another is loaded as code
+_LARGEST_ATTRIBUTE = 1000  # numerical: bytes of one that may state something about the samples
 
 
 def read_hdf5(path: Path, text: TextSpec = TextSpec()) -> RawFile:
@@ -28,14 +28,17 @@ def read_hdf5(path: Path, text: TextSpec = TextSpec()) -> RawFile:
     import h5py
 
     limit = MemoryLimit.of(path)
-    found: dict[str, NDArray[Any]] = {}
+    found = Gathered()
     sets: list[tuple[str, Any, list[str]]] = []
 
     def look(name: str, item: Any) -> None:
-        if isinstance(item, h5py.Dataset):
+        for key in item.attrs:
+            if item.attrs.get_id(key).get_storage_size() <= _LARGEST_ATTRIBUTE:
+                found.add(f"{name}.{key}".lstrip("."), item.attrs[key])
+        if isinstance(item, h5py.Dataset) and item.attrs.get("MATLAB_class") != b"char":
             _check_own(path, name, item)
             fields = _fields_of_numbers(item.dtype)
-            if item.shape and fields is not None and is_gathered(item.shape):
+            if fields is not None and (is_gathered(item.shape) or item.size == 1):
                 sets.append((name, item, fields))
 
     def follow(name: str, link: Any) -> str | None:
@@ -44,11 +47,13 @@ def read_hdf5(path: Path, text: TextSpec = TextSpec()) -> RawFile:
     with parsing(path, "HDF5 file", "write it again"), h5py.File(path, "r") as file:
         if (outside := file.visititems_links(follow)) is not None:
             raise InputError(f"{path}: {_shown(outside)} is a link to another file; copy the data into this one")
+        look("", file)
         file.visititems(look)
+        found.matrices.clear()  # what attributes hold are no samples
         limit.needs(sum(_size(item, fields) for _, item, fields in sets))
         for name, item, fields in sets:
-            gather(name.replace("/", "."), (item.fields(fields) if fields else item)[()], found)
-    return tables_by_length(path, "hdf5", found)
+            found.add(name.replace("/", "."), (item.fields(fields) if fields else item)[()])
+    return found.file(path, "hdf5")
 
 
 def _check_own(path: Path, name: str, item: Any) -> None:

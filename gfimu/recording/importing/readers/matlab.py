@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gfimu.base.child_process import run_module
 from gfimu.base.errors import InputError
@@ -24,7 +23,7 @@ from gfimu.base.files.memory import MemoryLimit, with_memory
 from gfimu.recording.importing.column_map import TextSpec
 from gfimu.recording.importing.raw_table import RawFile
 from gfimu.recording.importing.readers.hdf5 import read_hdf5
-from gfimu.recording.importing.readers.matrices import gather, tables_by_length
+from gfimu.recording.importing.readers.matrices import Gathered
 from gfimu.recording.reading import parsing
 
 __all__ = ["read_matlab"]
@@ -55,10 +54,9 @@ def read_matlab(path: Path, text: TextSpec = TextSpec()) -> RawFile:
         if done.returncode or not out.exists():
             raise InputError(f"{path}: damaged MATLAB file (its parser fails on it); save it again")
         with np.load(out, allow_pickle=False) as content:
-            found = dict(
-                zip(content["names"].tolist(), (content[f"c{k}"] for k in range(len(content["names"]))), strict=True)
-            )
-    return tables_by_length(path, "matlab", found)
+            found = Gathered({name: content[f"c{k}"] for k, name in enumerate(content["names"].tolist())})
+            found.lines.extend(content["lines"].tolist())
+    return found.file(path, "matlab")
 
 
 def _main(file: str, out: str, most: str) -> int:
@@ -66,7 +64,7 @@ def _main(file: str, out: str, most: str) -> int:
     from scipy.io import loadmat
 
     path = as_path(with_memory(file, int(most)))
-    found: dict[str, NDArray[Any]] = {}
+    found = Gathered()
     try:
         with parsing(path, "MATLAB file", "save it again"):
             MemoryLimit.of(path).needs(_TIMES_UNPACKED * _unpacked_size(path))
@@ -74,14 +72,12 @@ def _main(file: str, out: str, most: str) -> int:
                 content = loadmat(file, simplify_cells=True)
             except NotImplementedError:  # version 7.3 is HDF5
                 return _NEWER
-            for name, value in content.items():
-                if not name.startswith("__"):
-                    gather(name, value, found)
+            found.add("", {name: value for name, value in content.items() if not name.startswith("__")})
     except InputError as error:
         sys.stderr.write(f"{error}\n")
         return _REFUSED
-    columns: dict[str, Any] = {f"c{k}": one for k, one in enumerate(found.values())}
-    np.savez(out, names=np.array(list(found), dtype=str), **columns)
+    columns: dict[str, Any] = {f"c{k}": one for k, one in enumerate(found.matrices.values())}
+    np.savez(out, names=np.array(list(found.matrices), dtype=str), lines=np.array(found.lines, dtype=str), **columns)
     return 0
 
 

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import datetime as dt
+import itertools
 import sys
 import zipfile
+from collections import Counter
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -22,9 +25,11 @@ from gfimu.recording.importing.raw_table import RawFile, RawTable
 from gfimu.recording.importing.readers.text import GROWS, cell_values, table_of_text
 from gfimu.recording.reading import parsing, read_bytes
 
-__all__ = ["is_workbook", "read_excel", "read_json"]
+__all__ = ["read_excel", "read_json"]
 
 _LEAST_ROWS = 3
+_MOST_LINES, _LONGEST_WORDS = 100, 200  # numerical: of what is stated beside the readings, characters of each
+_LEAST_SHARE, _SAME_KIND = 0.1, 0.7  # of the rows of the most frequent kind of records; of the keys of one
 _MOST_CELLS = 64  # of a list in a record: what has more is no sample
 _GROWS: Mapping[bytes, int] = {b"{": 280, b"[": 100, b",": 48, b":": 62}
 """Numerical: memory for an object, a list, a value and a key of JSON while they become columns, bytes, measured."""
@@ -48,10 +53,22 @@ def read_json(path: Path, text: TextSpec = TextSpec()) -> RawFile:
     tables = {name: table for name, table in _tables(content, "") if len(table) >= _LEAST_ROWS}
     if not tables:
         raise InputError(f"{path}: JSON without a list of readings; write a record per sample, or a list per column")
+    stated = tuple(itertools.islice(_stated(content, ""), _MOST_LINES))
     note = (f"{path}: left out {lost} lines that are no JSON",) if lost else ()
     return RawFile(
-        str(path), "json", {name: RawTable(name, one.columns, (*note, *one.notes)) for name, one in tables.items()}
+        str(path),
+        "json",
+        {name: replace(one, notes=(*note, *one.notes), preamble=stated) for name, one in tables.items()},
     )
+
+
+def _stated(content: Any, name: str) -> Iterator[str]:
+    """Yield the single values beside the readings, as the sample rate, one line each."""
+    if isinstance(content, Mapping):
+        for key, one in content.items():
+            yield from _stated(one, f"{name}.{key}".lstrip("."))
+    elif not isinstance(content, list):
+        yield f"{name}: {str(content)[:_LONGEST_WORDS]}"
 
 
 def _lines(data: bytes) -> tuple[list[Any], int]:
@@ -71,10 +88,12 @@ def _tables(content: Any, name: str) -> Iterator[tuple[str, RawTable]]:
     if isinstance(content, list) and content:
         if all(isinstance(one, Mapping) for one in content[:_LEAST_ROWS]):
             yield from _of_records(content, name)
-        elif _is_matrix(content):
-            yield name, _table(name, dict(_side_by_side({"row": content})), [])
         elif all(isinstance(one, list) for one in content[:_LEAST_ROWS]):
-            yield from _of_records([{"row": one} for one in content], name)
+            columns = dict(_side_by_side({"row": content}))
+            if "row" not in columns:
+                yield name, replace(_table(name, columns), named=False)
+            else:
+                yield from _of_records([{"row": one} for one in content], name)
     elif isinstance(content, Mapping):
         lists = {key: one for key, one in content.items() if isinstance(one, list) and len(one) >= _LEAST_ROWS}
         plain = {key: one for key, one in lists.items() if not isinstance(one[0], Mapping)}
@@ -84,58 +103,37 @@ def _tables(content: Any, name: str) -> Iterator[tuple[str, RawTable]]:
             yield from _tables({key: list(one.values()) for key, one in content.items()}, name)
             return
         if len(plain) >= 2 and len(lengths) == 1:
-            yield name, _table(name, dict(_side_by_side(plain)), [])
+            yield name, _table(name, dict(_side_by_side(plain)))
         for key, one in content.items():
-            if key not in plain or len(lengths) != 1:
+            if key not in plain or len(plain) < 2 or len(lengths) != 1:
                 yield from _tables(one, f"{name}.{key}".lstrip("."))
 
 
-def _is_matrix(content: list[Any]) -> bool:
-    """Whether a list holds rows of the same number of cells."""
-    if not all(isinstance(row, list) for row in content):
-        return False
-    widths = {len(row) for row in content}
-    return (
-        len(widths) == 1
-        and 0 < min(widths) <= _MOST_CELLS
-        and not any(isinstance(one, list | Mapping) for one in content[0])
-    )
-
-
 def _side_by_side(lists: Mapping[str, list[Any]]) -> Iterator[tuple[str, list[Any]]]:
-    """Yield lists of numbers as columns, and of lists of numbers their places: ``acc[0]``."""
+    """Yield lists of cells as columns, and of lists of as many cells each their places: ``acc[0]``."""
     for key, one in lists.items():
-        widths = {len(row) for row in one if isinstance(row, list)}
-        if len(widths) == 1 and all(isinstance(row, list) for row in one):
-            yield from ((f"{key}[{index}]", [row[index] for row in one]) for index in range(min(widths)))
+        widths = {len(row) if isinstance(row, list) else 0 for row in one}
+        width = max(widths)
+        is_flat = len(widths) == 1 and 0 < width <= _MOST_CELLS
+        if is_flat and not any(isinstance(cell, list | Mapping) for cell in one[0]):
+            yield from ((f"{key}[{index}]", [row[index] for row in one]) for index in range(width))
         else:
             yield key, one
 
 
 def _of_records(records: list[Any], name: str) -> Iterator[tuple[str, RawTable]]:
     """Yield the table of a list of records; one per set of keys where they differ, as of messages of several kinds."""
-    kinds: dict[tuple[str, ...], list[dict[str, Any]]] = {}
-    for one in records:
-        if isinstance(one, Mapping):
-            flat = dict(_flat(one, ""))
-            kinds.setdefault(tuple(sorted(flat)), []).append(flat)
-    large = [rows for rows in kinds.values() if len(rows) >= 0.1 * max(map(len, kinds.values()), default=0)]
-    apart = len(large) > 1 and all(
-        len(set(one[0]) & set(two[0])) < 0.7 * max(len(one[0]), len(two[0]))
-        for index, one in enumerate(large)
-        for two in large[index + 1 :]
-    )
-    if not apart:
-        large = [[row for rows in kinds.values() for row in rows]] if len(kinds) == 1 else [_in_order(records)]
-    for rows in large:
-        keys = list(dict.fromkeys(key for row in rows for key in row))
-        own = [key for key in keys if not apart or all(key not in other[0] for other in large if other is not rows)]
-        label = f"{name} {own[0].partition('.')[0]}".strip() if apart and own else name
-        yield label, _table(label, {key: [row.get(key) for row in rows] for key in keys}, [])
-
-
-def _in_order(records: list[Any]) -> list[dict[str, Any]]:
-    return [dict(_flat(record, "")) for record in records if isinstance(record, Mapping)]
+    rows = [dict(_flat(one, "")) for one in records if isinstance(one, Mapping)]
+    counts = Counter(frozenset(row) for row in rows)
+    kinds = [keys for keys, count in counts.items() if count >= _LEAST_SHARE * max(counts.values())]
+    shared = frozenset.intersection(*kinds) if kinds else frozenset()
+    if len(kinds) < 2 or len(shared) >= _SAME_KIND * max(map(len, kinds)):
+        kinds = []  # keys are left out here and there
+    for group in [[row for row in rows if row.keys() == keys] for keys in kinds] or [rows]:
+        own = next((key for key in group[0] if kinds and key not in shared), "").partition(".")[0]
+        label = f"{name} {own}".strip()
+        keys = dict.fromkeys(key for row in group for key in row)
+        yield label, _table(label, {key: [row.get(key) for row in group] for key in keys})
 
 
 def _flat(record: Mapping[str, Any], before: str) -> Iterator[tuple[str, Any]]:
@@ -154,8 +152,9 @@ def _flat(record: Mapping[str, Any], before: str) -> Iterator[tuple[str, Any]]:
             yield name, value
 
 
-def _table(name: str, columns: Mapping[str, list[Any]], notes: list[str]) -> RawTable:
+def _table(name: str, columns: Mapping[str, list[Any]]) -> RawTable:
     found: dict[str, NDArray[Any]] = {}
+    notes = []
     for key, cells in columns.items():
         whole = all(type(cell) is int and abs(cell) < 2**63 for cell in cells)
         numbers = [one for one in cells if isinstance(one, int | float) and not isinstance(one, bool)]
@@ -171,15 +170,6 @@ def _table(name: str, columns: Mapping[str, list[Any]], notes: list[str]) -> Raw
             if unreadable:
                 notes.append(f"column {key}: {unreadable} cells are no numbers and count as missing")
     return RawTable(name, found, tuple(notes))
-
-
-def is_workbook(path: Path) -> bool:
-    """Whether a zip archive is an Excel workbook."""
-    try:
-        with zipfile.ZipFile(path) as archive:
-            return any(name.startswith("xl/") for name in archive.namelist())
-    except (zipfile.BadZipFile, OSError, ValueError, RuntimeError):  # also of a version that is not implemented
-        return False
 
 
 def read_excel(path: Path, text: TextSpec = TextSpec()) -> RawFile:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,9 +16,11 @@ from gfimu.recording.importing.raw_table import RawFile
 from gfimu.recording.importing.readers.hdf5 import read_hdf5
 from gfimu.recording.importing.readers.logs import read_bag, read_mcap, read_ulog
 from gfimu.recording.importing.readers.matlab import read_matlab
-from gfimu.recording.importing.readers.records import is_workbook, read_excel, read_json
-from gfimu.recording.importing.readers.tables import read_archive, read_parquet
+from gfimu.recording.importing.readers.matrices import read_numpy
+from gfimu.recording.importing.readers.records import read_excel, read_json
+from gfimu.recording.importing.readers.tables import archive_format, read_archive, read_arrow, read_parquet
 from gfimu.recording.importing.readers.text import is_text, read_text
+from gfimu.recording.reading import first_unpacked
 
 __all__ = ["READERS", "Reader", "format_of", "read_foreign", "readers"]
 
@@ -44,18 +47,33 @@ class Reader:
 
 
 READERS: Mapping[str, Reader] = {
-    "text": Reader(read_text, (b"\x1f\x8b\x08",)),
+    "text": Reader(read_text, ()),
     "parquet": Reader(read_parquet, (b"PAR1",)),
+    "arrow": Reader(read_arrow, (b"ARROW1",)),
     "zip": Reader(read_archive, (b"PK\x03\x04",)),
     "excel": Reader(read_excel, ()),
     "json": Reader(read_json, (b'{"', b"{\n", b"{\r", b'[{"', b"[\n", b"[\r", b"[[")),
     "matlab": Reader(read_matlab, (b"MATL",)),
     "hdf5": Reader(read_hdf5, (b"\x89HDF",)),
+    "numpy": Reader(read_numpy, (b"\x93NUMPY",)),
     "ulog": Reader(read_ulog, (b"ULog",)),
     "mcap": Reader(read_mcap, (b"\x89MCA",)),
     "rosbag": Reader(read_bag, (b"#ROS", b"SQLi")),
 }
 """Readers of gfimu by the name of the format."""
+
+_NOT_READ: Mapping[str, tuple[bytes, ...]] = {
+    "an Excel 97 workbook; save it as .xlsx or .csv": (b"\xd0\xcf\x11\xe0",),
+    "a LabVIEW TDMS file; export it as .lvm or .csv": (b"TDSm",),
+    "a Python pickle, which could run code; save the arrays as .npz": (
+        b"\x80\x02",
+        b"\x80\x03",
+        b"\x80\x04",
+        b"\x80\x05",
+    ),
+}
+_POINTER = re.compile(rb"version https://git-lfs.{0,400}?\nsize (\d+)", re.DOTALL)
+_PACKABLE = ("text", "json")  # formats that are read packed by gzip, bzip2 or xz
 
 
 def readers() -> dict[str, Reader]:
@@ -75,17 +93,25 @@ def format_of(path: Path) -> str:
         if (path / "metadata.yaml").is_file():
             return "rosbag"
         raise InputError(f"{path}: a folder that is no ROS 2 bag; give a file")
-    head = first_bytes(path, 4096)
-    if not head:
+    packed = first_bytes(path, 4096)
+    if not packed:
         raise InputError(f"{path}: empty file; record again or give another file")
-    known = readers()
+    if pointer := _POINTER.match(packed):
+        size = pointer[1].decode()
+        raise InputError(f"{path}: a Git LFS pointer of a file of {size} bytes; fetch it with git lfs pull")
+    head = first_unpacked(packed)
     plain = head.removeprefix(b"\xef\xbb\xbf").lstrip() if head.lstrip()[:1] in {b"{", b"["} else head
-    for name, reader in known.items():
-        if reader.marks and plain.startswith(reader.marks):
-            return "excel" if name == "zip" and is_workbook(path) else name
-    if is_text(head):
-        return "text"
-    raise InputError(f"{path}: a binary file of unknown format; known are {', '.join(known)}")
+    known = readers()
+    marked = (name for name, reader in known.items() if reader.marks and plain.startswith(reader.marks))
+    name = next(marked, "text" if is_text(head) else "")
+    if not name:
+        unknown = f"a binary file of unknown format; known are {', '.join(known)}"
+        raise InputError(
+            f"{path}: {next((what for what, marks in _NOT_READ.items() if head.startswith(marks)), unknown)}"
+        )
+    if head is not packed and name not in _PACKABLE:
+        raise InputError(f"{path}: a packed {name} file; unpack it")
+    return archive_format(path) if name == "zip" else name
 
 
 def read_foreign(path: str | Path, kind: str = "", text: TextSpec = TextSpec()) -> RawFile:

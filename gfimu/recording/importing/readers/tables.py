@@ -22,7 +22,7 @@ from gfimu.recording.tables.arrow import as_found
 from gfimu.recording.tables.column_file import open_parquet
 from gfimu.recording.tables.table_columns import TableColumns
 
-__all__ = ["read_archive", "read_parquet", "table_file"]
+__all__ = ["archive_format", "read_archive", "read_arrow", "read_parquet", "table_file"]
 
 
 def read_parquet(path: Path, text: TextSpec = TextSpec()) -> RawFile:
@@ -33,6 +33,14 @@ def read_parquet(path: Path, text: TextSpec = TextSpec()) -> RawFile:
             file.schema_arrow.names
         )  # one column after the other: in Arrow's form and NumPy's, all take twice as much
         return RawFile(str(path), "parquet", {"": _arrow_table((one, file.read([one]).column(one)) for one in names)})
+
+
+def read_arrow(path: Path, text: TextSpec = TextSpec()) -> RawFile:
+    """Read an Arrow file (Feather 2)."""
+    with parsing(path, "Arrow file", "write it again"):  # Arrow's own pools would take memory in advance
+        table = pa.ipc.open_file(path.read_bytes(), memory_pool=pa.system_memory_pool()).read_all()
+        MemoryLimit.of(path).needs(2 * table.nbytes)
+        return RawFile(str(path), "arrow", {"": _arrow_table(zip(table.column_names, table.columns, strict=True))})
 
 
 def _arrow_table(found: Iterable[tuple[str, pa.ChunkedArray]]) -> RawTable:
@@ -62,6 +70,26 @@ def table_file(source: Any) -> RawFile:
     name = TableColumns(source).file
     table = pa.Table.from_pandas(source) if hasattr(source, "reset_index") else pa.table(source)
     return RawFile(name, "table", {"": _arrow_table(zip(table.column_names, table.columns, strict=True))})
+
+
+def archive_format(path: Path) -> str:
+    """Return the format of a zip archive by the names of what is in it.
+
+    Raises
+    ------
+    InputError
+        If it is an OpenDocument spreadsheet, which is not read.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            names = archive.namelist()
+    except (zipfile.BadZipFile, OSError, ValueError, RuntimeError):  # also of a version that is not implemented
+        return "zip"
+    if "content.xml" in names:
+        raise InputError(f"{path}: an OpenDocument spreadsheet; save it as .xlsx or .csv")
+    if any(name.startswith("xl/") for name in names):
+        return "excel"
+    return "numpy" if names and all(name.endswith(".npy") for name in names) else "zip"
 
 
 def read_archive(path: Path, text: TextSpec = TextSpec()) -> RawFile:

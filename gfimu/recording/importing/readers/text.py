@@ -18,7 +18,7 @@ from gfimu.base.errors import InputError
 from gfimu.base.files.memory import MemoryLimit
 from gfimu.recording.importing.column_map import TextSpec
 from gfimu.recording.importing.raw_table import RawFile, RawTable
-from gfimu.recording.importing.readers.text_layout import COMMENT_MARKS, Layout, layout_of
+from gfimu.recording.importing.readers.text_layout import COMMENT_MARKS, Layout, layout_of, trailer, upright
 from gfimu.recording.importing.readers.text_lines import plain_lines
 from gfimu.recording.reading import MOST_COLUMNS, read_bytes
 from gfimu.recording.tables.arrow import as_found
@@ -31,8 +31,12 @@ _THOUSANDS = r"\.(\d{3})"  # a point between groups of digits, where a comma is 
 _NO_NUMBER = ["", "nan", "-nan", "+nan", "na", "n/a", "null", "none", "-"]
 _INFINITE = r"^[+-]?inf(inity)?$"
 _IS_NUMBERS = 0.5  # of the filled cells of a column
-_MOST_PREAMBLE = 100  # lines
+_MOST_PREAMBLE = 100  # numerical: lines
 _HEAD_LINES = 600  # by which the layout is found, and the preamble
+_LAST = 4000  # numerical: characters in which lines after the numbers are looked for
+_MOST_SERIES = 64  # numerical: lines of a file that may have a column per line, as columns of a matrix
+_LOSSES = "(?:overflow|overrun|dropped|lost|missed)"
+_LOST = re.compile(rf"{_LOSSES}\w*\W{{0,4}}[1-9]\d*|\b[1-9]\d* (?:samples? )?{_LOSSES}\w*", re.IGNORECASE)
 _BLOCK = 8_000_000  # numerical: characters that are cut into lines at once
 _ESCAPE = "\x1b"
 GROWS = 3.0
@@ -58,6 +62,8 @@ def table_of_text(data: bytes, source: str, text: TextSpec = TextSpec(), limit: 
     del data
     if not content.strip():
         raise InputError(f"{source}: empty file; record again or give another file")
+    if len(content) <= _BLOCK and content.count("\n") <= _MOST_SERIES:
+        content = "\n".join(upright(content.split("\n")))
     head, rest = _first_lines(content)
     _check_widths(head, source)
     lines = plain_lines(head)
@@ -73,7 +79,8 @@ def table_of_text(data: bytes, source: str, text: TextSpec = TextSpec(), limit: 
         )
     if len(layout.names) > MOST_COLUMNS:
         raise _too_wide(source, len(layout.names))
-    table, left_out, repeated = _cells(_blocks(lines[layout.first :], content, rest), layout, lines, source)
+    stated = trailer(content[-_LAST:].split("\n") if is_plain else lines[-_HEAD_LINES:], lines[layout.first], layout)
+    table, left_out, repeated = _cells(_blocks(lines[layout.first :], content, rest), layout, lines, stated, source)
     del content
     notes = [f"{source}: left out {left_out} lines with another number of cells"] if left_out else []
     notes += [f"{source}: left out {repeated} lines that repeat one before the numbers"] if repeated else []
@@ -85,7 +92,9 @@ def table_of_text(data: bytes, source: str, text: TextSpec = TextSpec(), limit: 
         columns[name] = values
         if unreadable:
             notes.append(f"{source}: column {name}: {unreadable} cells are no numbers and count as missing")
-    return RawTable("", columns, tuple(notes), layout.named, _preamble(lines, layout))
+    stated = [*_preamble(lines, layout), *stated]
+    notes += [f"{source}: states {lost[0]!r}, so samples were lost" for line in stated if (lost := _LOST.search(line))]
+    return RawTable("", columns, tuple(notes), layout.named, tuple(stated))
 
 
 def _first_lines(content: str) -> tuple[list[str], int]:
@@ -124,7 +133,9 @@ def _blocks(first: list[str], content: str, place: int) -> Iterator[list[str]]:
         place = end + 1
 
 
-def _cells(blocks: Iterator[list[str]], layout: Layout, lines: list[str], source: str) -> tuple[pa.Table, int, int]:
+def _cells(
+    blocks: Iterator[list[str]], layout: Layout, lines: list[str], after: list[str], source: str
+) -> tuple[pa.Table, int, int]:
     """Return the cells of the lines of numbers as text, and how many lines are left out: of other widths, repeated."""
     left_out: list[Any] = []
     repeated = 0
@@ -140,6 +151,7 @@ def _cells(blocks: Iterator[list[str]], layout: Layout, lines: list[str], source
         filled = [line for line in block if line.strip() and line.lstrip()[0] not in COMMENT_MARKS]
         kept = [line for line in filled if line.strip() not in before]
         repeated += len(filled) - len(kept)
+        kept = [line for line in kept if line.strip() not in after]
         if not kept:
             continue
         if closed is None:

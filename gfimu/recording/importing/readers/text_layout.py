@@ -10,12 +10,9 @@ from dataclasses import dataclass
 
 from gfimu.recording.importing.notation import kind_of, unit_of_name
 
-__all__ = ["COMMENT_MARKS", "Layout", "cells_of", "layout_of"]
+__all__ = ["COMMENT_MARKS", "Layout", "cells_of", "layout_of", "trailer", "upright"]
 
 COMMENT_MARKS = "#;%/*"
-_LONGEST_CELL = 100  # characters of a number or time
-_LOOKED_AT = 400  # lines
-_QUOTED_AT = 20  # of these, at the end, that show whether numbers stand in quotes
 _SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " "}
 _NUMBER = {
     ".": re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE),
@@ -24,8 +21,24 @@ _NUMBER = {
     ),
 }
 _STAMP = re.compile(r"(\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4})?[T _]*(\d{1,2}:\d\d(:\d\d([.,:]\d+)?)?)?\s*([AaPp][Mm]|Z)?")
-_LEAST_NUMBERS = 0.5  # of the cells of a line of data
+_NOTHING = re.compile(r"n/?a|null|none|-", re.IGNORECASE)
 _NO_UNITS = {"", "-", "1", "raw", "cal", "counts", "lsb", "%", "mv", "v", "ut", "gauss", "hpa", "pa", "local_flux"}
+
+
+@dataclass(frozen=True)
+class LayoutPolicy:
+    """Thresholds by which the layout of a text file is found; each by choice."""
+
+    looked_at: int = 400  # lines
+    quoted_at: int = 20  # of these, at the end, that show whether numbers stand in quotes
+    longest_cell: int = 100  # characters of a number or time
+    least_numbers: float = 0.5  # of the filled cells of a line of data
+    least_flat: int = 20  # numbers of a line with a name before them, from which each line is a column
+    flat: int = 5  # times the lines: numbers of lines without names, from which each line is a column
+    most_last: int = 20  # lines after the numbers
+
+
+_POLICY = LayoutPolicy()
 
 
 @dataclass(frozen=True)
@@ -69,11 +82,13 @@ def layout_of(
     names : sequence of str
         Known names of the columns.
     """
-    looked = list(lines[:_LOOKED_AT])
-    quoted = any('"' in line for line in looked[-_QUOTED_AT:])
+    looked = list(lines[: _POLICY.looked_at])
+    quoted = any('"' in line for line in looked[-_POLICY.quoted_at :])
     best: tuple[tuple[int, float, int], Layout] | None = None
-    for mark in [_SEPARATORS.get(separator, separator)] if separator else _SEPARATORS.values():
-        for point in [decimal] if decimal else [".", ","]:
+    there = set().union(*looked)
+    marks = [one for one in _SEPARATORS.values() if one in there or one == " "]
+    for mark in [_SEPARATORS.get(separator, separator)] if separator else marks:
+        for point in [decimal] if decimal else [".", ","] if "," in there else ["."]:
             if point == mark and not quoted:
                 continue
             data = _data_lines(looked, mark, point, skip or 0)
@@ -82,11 +97,14 @@ def layout_of(
             counted = [(number, len(cells)) for number, cells in data]
             (width, lines_so), *_ = Counter(count for _, count in counted).most_common(1)
             first = next(number for number, count in counted if count == width) if skip is None else skip
-            header = _header(looked[:first], mark, width) if not names else None
+            row_name = cells_of(looked[first], mark)[0]
+            header = _header(looked[:first], mark, width, row_name) if not names else None
             numbered = tuple(f"column_{place}" for place in range(1, width + 1))
             # Names may end before the cells do, as where a separator closes each line.
             known = tuple(names) + numbered[len(names) :] if names else header or numbered
-            score = (lines_so, _share_read([cells for _, cells in data if len(cells) == width], point), width)
+            share = _share_read([cells for _, cells in data if len(cells) == width], point)
+            # Spaces part dates from times and words of names too: another mark goes before them where it reads as much.
+            score = (lines_so, share, width if mark != " " else 1)
             # A point is the usual decimal mark: a comma has to read more lines, or more cells of them.
             if best is None or score > best[0]:
                 best = score, Layout(mark, point, first, known, bool(names) or header is not None)
@@ -108,6 +126,47 @@ def cells_of(line: str, separator: str) -> list[str]:
     return [cell.strip() for cell in closed.split(separator)]
 
 
+def upright(lines: Sequence[str]) -> list[str]:
+    """Return the lines of a text file that has a column per line, a name or none before its numbers, as usual ones."""
+    filled = [line for line in lines if line.strip() and line.lstrip()[0] not in COMMENT_MARKS]
+    if len(filled) < 2:
+        return list(lines)
+    mark = max(_SEPARATORS.values(), key=lambda one: len(cells_of(filled[-1], one)))
+    rows = [cells_of(line, mark) for line in filled]
+    width = len(rows[-1])
+    rows = [row for row in rows if len(row) == width]
+    named = not any(_is_datum(row[0]) for row in rows)
+    if width - named < (1 if named else _POLICY.flat) * max(_POLICY.least_flat, len(rows)) or 2 * len(rows) < len(
+        filled
+    ):
+        return list(lines)
+    if not all(_is_datum(row[1]) for row in rows):
+        return list(lines)  # a line of names above
+    rest = [line for line in lines if line not in filled or len(cells_of(line, mark)) != width]
+    return [*(f"# {line}" for line in rest if line.strip()), *("\t".join(cells) for cells in zip(*rows, strict=True))]
+
+
+def trailer(last: Sequence[str], row: str, layout: Layout) -> list[str]:
+    """Return the lines after the numbers that state something: words in them where a row has numbers."""
+    pattern = [_is_datum(cell) for cell in cells_of(row, layout.separator)]
+    found: list[str] = []
+    for line in reversed(last[-_POLICY.most_last :]):
+        cells = cells_of(line, layout.separator)
+        is_row = len(cells) == len(pattern) and all(
+            _is_datum(cell) or not known for cell, known in zip(cells, pattern, strict=True)
+        )
+        if is_row or (line.strip() and not re.search(r"[A-Za-z]{2}", line)):
+            break
+        found += [line.strip()] if line.strip() else []
+    return found[::-1]
+
+
+def _is_datum(cell: str) -> bool:
+    """Whether a cell may be one of a row of numbers: a number with either decimal mark, a date or time, or nothing."""
+    plain = cell.strip('"')[: _POLICY.longest_cell]
+    return any(one.fullmatch(plain) for one in (*_NUMBER.values(), _STAMP, _NOTHING))
+
+
 def _data_lines(lines: Sequence[str], separator: str, decimal: str, skip: int) -> list[tuple[int, list[str]]]:
     """Return the lines that hold numbers, with their places."""
     number = _NUMBER[decimal]
@@ -117,8 +176,8 @@ def _data_lines(lines: Sequence[str], separator: str, decimal: str, skip: int) -
             continue
         cells = cells_of(line, separator)
         filled = [cell for cell in cells if cell]
-        numeric = sum(len(cell) <= _LONGEST_CELL and number.fullmatch(cell) is not None for cell in filled)
-        if numeric and numeric >= _LEAST_NUMBERS * len(filled):
+        numeric = sum(len(cell) <= _POLICY.longest_cell and number.fullmatch(cell) is not None for cell in filled)
+        if numeric and numeric >= _POLICY.least_numbers * len(filled):
             found.append((index, cells))
     return found
 
@@ -126,18 +185,18 @@ def _data_lines(lines: Sequence[str], separator: str, decimal: str, skip: int) -
 def _share_read(lines: Sequence[Sequence[str]], decimal: str) -> float:
     """Return which share of the filled cells are numbers, dates or times of day, to a hundredth."""
     filled = [cell for cells in lines for cell in cells if cell]
-    short = [cell for cell in filled if len(cell) <= _LONGEST_CELL]
+    short = [cell for cell in filled if len(cell) <= _POLICY.longest_cell]
     read = sum(_NUMBER[decimal].fullmatch(cell) is not None or _STAMP.fullmatch(cell) is not None for cell in short)
     return round(read / max(len(filled), 1), 2)
 
 
-def _header(before: Sequence[str], separator: str, width: int) -> tuple[str, ...] | None:
+def _header(before: Sequence[str], separator: str, width: int, row_name: str) -> tuple[str, ...] | None:
     """Return the names in the last line before the numbers, if it has one for each cell; with a line of units below."""
     units: list[str] = []
     for line in reversed(before):
         if not line.strip():
             continue
-        cells = _named_cells(line, separator, width)
+        cells = _named_cells(line, separator, width, is_row_named=row_name[:1] == '"' or not _is_datum(row_name))
         if cells is None:
             break
         if not units and _are_units(cells):
@@ -147,13 +206,15 @@ def _header(before: Sequence[str], separator: str, width: int) -> tuple[str, ...
     return _names(units, []) if units else None
 
 
-def _named_cells(line: str, separator: str, width: int) -> list[str] | None:
+def _named_cells(line: str, separator: str, width: int, *, is_row_named: bool) -> list[str] | None:
     """Return the cells of a line of names, one for each cell of a line of numbers; None where the numbers differ."""
     cells = cells_of(line.lstrip().lstrip(COMMENT_MARKS).lstrip(), separator)
     if len(cells) == width + 1:  # the line says what it is: ";Headers, time, Ax"; or it ends in a separator
         cells = cells[1:] if cells[-1] else cells[:-1]
     if len(cells) < width - 1 or len(cells) > width:
         return None
+    if is_row_named and len(cells) < width:
+        return ["", *(cell.strip('"') for cell in cells)]
     return cells + [""] * (width - len(cells))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections import Counter
 from collections.abc import Sequence
@@ -9,20 +10,32 @@ from collections.abc import Sequence
 __all__ = ["plain_lines"]
 
 _LOOKED_AT = 400  # lines
-_HOST_TIME = re.compile(r"^\s*\[?(\d{1,2}:\d\d:\d\d[.,:]\d+)\]?\s*(?:->|>|\]|\|)\s*")
+_DATE = r"(?:\d{4}-\d\d-\d\d[T _])?"
+_HOST_TIME = re.compile(
+    rf"^\s*\[?({_DATE}\d{{1,2}}:\d\d:\d\d[.,:]\d+)\]?(?:\s*(?:->|>|\]|\|)\s*|\s+(?=[^\s,;]+\s*[,;\t]))"
+)
 _LABELLED = re.compile(
     r"([A-Za-z_][\w .\[\]()/°²^-]{0,60}?)\s*[:=]\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?![\d:])"
 )
 _BRACKETED = re.compile(r"^\s*[\[({][^A-Za-z\"]*[\])}]\s*,?\s*$")
 _CHECKED = re.compile(r"\*[0-9A-Fa-f]{2}\s*$")
-_STAMP = re.compile(r"(?:\d{4}-\d\d-\d\d[T _])?\d{1,2}:\d\d:\d\d(?:[.,:]\d+)?")
+_STAMP = re.compile(rf"{_DATE}\d{{1,2}}:\d\d:\d\d(?:[.,:]\d+)?")
+_PLOTTED = re.compile(r"^>([A-Za-z_][\w.]*):(\d+(?:\.\d+)?):([+-]?[\d.]+(?:[eE][+-]?\d+)?)")
 _REMARK = re.compile(r"(?<=\d)\s*(?://|#)[^\"]*$")
 _COLOURS = re.compile(r"\x1b\[[\d;]*m")
 _TICK = re.compile(r"^\s*[IWEDV] \((\d+)\)")
 _UNIT = re.compile(r"\s*([A-Za-zµ°²%/^\d]{0,8})\s*$")
+_PREFIXED = re.compile(
+    r"^(.{0,200}(?:(?<!\w)([A-Za-z]\w*)|[\])])\s*(?::|->|-|>|\|)\s*)(X(?:[\s,;]+X)+)[\s,;]*$".replace(
+        "X", r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+    )
+)
+_SECONDS = re.compile(r"\[\s*(\d+\.\d+)\]")
 _HOST = "host_time"
+_LABVIEW, _END = "LabVIEW Measurement", "***End_of_Header***"
 _LONGEST = 10_000  # characters of a line of a serial monitor
 _LEAST = 0.5  # of the filled lines
+_MOST_LABELS = 8  # words before the numbers of a log: sensors
 _LEAST_OFTEN = 0.5  # of the lines of the most frequent kind
 
 
@@ -31,7 +44,8 @@ def plain_lines(lines: Sequence[str]) -> list[str]:
 
     Named cells become a table with a header. Other lines stay as they are.
     """
-    return _without_labels(_with_host_time(_without_frames(list(lines))))
+    lines = _of_labview(lines) if lines and lines[0].startswith(_LABVIEW) else list(lines)
+    return _without_labels(_without_prefixes(_with_host_time(_without_frames(lines))))
 
 
 def _most(lines: Sequence[str], mark: re.Pattern[str]) -> bool:
@@ -45,6 +59,13 @@ def _without_frames(lines: list[str]) -> list[str]:
     lines = [_COLOURS.sub("", line) for line in lines] if any("\x1b" in line for line in lines[:_LOOKED_AT]) else lines
     if _most(lines, _REMARK):
         lines = [_REMARK.sub("", line) for line in lines]
+    if _most(lines, _PLOTTED):
+        first = next(found[1] for line in lines if (found := _PLOTTED.match(line)))
+        return [
+            f"time:{one[2]},{one[1]}:{one[3]}" if one[1] == first else f"{one[1]}:{one[3]}"
+            for one in map(_PLOTTED.match, lines)
+            if one
+        ]
     if _most(lines, _BRACKETED):
         return [re.sub(r"[\[\](){}]", "", line) if _BRACKETED.search(line) else line for line in lines]
     if _most(lines, _CHECKED):
@@ -69,6 +90,41 @@ def _with_host_time(lines: list[str]) -> list[str]:
     return plain
 
 
+def _without_prefixes(lines: list[str]) -> list[str]:
+    """Return lines as ``[INFO] [12.345]: 0.1, 0.2`` without what a log puts before, with its time as the first cell.
+
+    Lines that begin with different words, as ``acc: 0.1 0.2 9.8``, have three named cells each.
+    """
+    if not _most(lines, _PREFIXED):
+        return lines
+    found = {k: one for k, line in enumerate(lines) if len(line) <= _LONGEST and (one := _PREFIXED.match(line))}
+    several = 1 < len({one[2] for one in found.values()}) <= _MOST_LABELS
+    plain = list(lines)
+    for place, one in found.items():
+        stamp, cells = _stamp(one[1]), re.split(r"[\s,;]+", one[3])
+        if several and len(cells) == 3:
+            cells = [f"{one[2]} {axis}: {cell}" for axis, cell in zip("XYZ", cells, strict=True)]
+        plain[place] = ";".join([stamp, *cells] if stamp else cells)
+    return plain
+
+
+def _of_labview(lines: Sequence[str]) -> list[str]:
+    """Return the names, units and rows of all segments of a LabVIEW measurement file; its rate as a comment."""
+    fields = {cells[0]: cells[1:] for cells in (line.split("\t") for line in lines[:_LOOKED_AT])}
+    rows: list[str] = []
+    names = ""
+    for segment in "\n".join(lines).split(_END)[2:]:
+        names, *body = segment.split("\n")[1:] or [names]
+        rows += itertools.takewhile(str.strip, body)
+    names = names.removesuffix("\tComment")
+    width = names.count("\t") + 1
+    units = "\t".join(["s", *fields.get("Y_Unit_Label", [])[: width - 1]])
+    step = re.fullmatch(r"\d{1,9}[.,]?\d{0,16}(E[+-]?\d\d?)?", fields.get("Delta_X", [""])[0])
+    period = float(step[0].replace(",", ".")) if step else 0.0
+    rate = [f"# sample rate {1.0 / period:.9g} Hz"] if period else []
+    return [*rate, names, units, *("\t".join(line.split("\t")[:width]) for line in rows)] if rows else list(lines)
+
+
 def _without_labels(lines: list[str]) -> list[str]:
     """Return lines as ``t:88 ax:0.1`` as a header and lines of numbers; several kinds of lines in turn make one row."""
     looked = [line for line in lines[:_LOOKED_AT] if line.strip()]
@@ -77,6 +133,7 @@ def _without_labels(lines: list[str]) -> list[str]:
         return lines
     often = max(kinds.values())
     order = [labels for labels in kinds if kinds[labels] >= _LEAST_OFTEN * often]
+    order = [labels[labels[0] == _HOST and place > 0 :] for place, labels in enumerate(order)]
     if sum(len(labels) for labels in order) < 3:
         return lines
     names = [name for labels in order for name in labels]
@@ -85,6 +142,7 @@ def _without_labels(lines: list[str]) -> list[str]:
     rows: list[dict[str, str]] = []
     for line in lines:
         labels = _labels(line)
+        labels = labels if labels in order else labels[1:]
         if labels not in order:
             continue
         if labels == order[0] or not rows:
@@ -93,13 +151,14 @@ def _without_labels(lines: list[str]) -> list[str]:
         numbers = [number for _, number in _LABELLED.findall(line)]
         cells = [stamp, *numbers] if labels[0] == _HOST and stamp else numbers
         rows[-1] |= dict(zip(labels, cells, strict=True))
-    return [";".join(names), *(";".join(row.get(name, "") for name in names) for row in rows)]
+    before = [f"# {line}" for line in itertools.takewhile(lambda line: _labels(line) not in order, lines)]
+    return [*before, ";".join(names), *(";".join(row.get(name, "") for name in names) for row in rows)]
 
 
 def _stamp(text: str) -> str:
     """Return the time in front of a line: a date or time of day, or ms since the start as an ESP32 prints them."""
     found = _STAMP.search(text)
-    tick = _TICK.match(text)
+    tick = _TICK.match(text) or _SECONDS.search(text)
     return found[0] if found else tick[1] if tick else ""
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import lzma
 import sys
 import zipfile
 import zlib
@@ -101,6 +102,21 @@ def lines_of_metadata(path: Path) -> None:
     path.write_text("".join(f"# k{k}: [{'[],' * 300}[]]\n" for k in range(950)) + "t_s,a11_m_s2\n0,1\n1,2\n")
 
 
+def packed_matrix(path: Path) -> None:
+    np.savez_compressed(path.with_suffix(".npz"), a=np.zeros((1_000_000, 4)))
+    path.with_suffix(".npz").rename(path)
+
+
+def packed_arrow(path: Path) -> None:
+    from pyarrow.feather import write_feather
+
+    write_feather(pa.table({name: np.zeros(1_000_000) for name in "tabc"}), str(path), compression="zstd")
+
+
+def text_in_xz(path: Path) -> None:
+    path.write_bytes(lzma.compress(b"t,ax,ay,az\n" + b"0.0,0.0,0.0,9.8\n" * 1_000_000))
+
+
 def packed_stream(path: Path) -> None:
     path.write_bytes(gzip.compress(bytes.fromhex("A02800C8") + bytes(10_000_000)))
 
@@ -119,6 +135,9 @@ CASES = {
     "matlab": (packed_matlab, read_foreign, LIMIT),
     "gzip": (packed_text, read_foreign, LIMIT),
     "zip": (zipped_text, read_foreign, LIMIT),
+    "xz": (text_in_xz, read_foreign, LIMIT),
+    "numpy": (packed_matrix, read_foreign, LIMIT),
+    "arrow": (packed_arrow, read_foreign, LIMIT),
     "xlsx": (rows_without_cells, read_foreign, LIMIT),
     "json": (small_objects, read_foreign, LIMIT),
     "serial": (named_cells, read_foreign, LIMIT),
