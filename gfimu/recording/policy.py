@@ -91,6 +91,8 @@ class SamplePolicy:
         White noise beside the median of the channels [ratio]. By choice.
     sentinel_apart : float
         Distance of a number that stands for a missing one from all others [their range]. By choice.
+    quietest : float
+        White noise of one reading of the quietest accelerometer whose part is not known [m/s²]. 1 µg/√Hz at 100 Hz.
     least_noise : float
         White noise beside the data sheet's, from which a channel surely has noise of its own [ratio]. By choice.
     """
@@ -115,6 +117,7 @@ class SamplePolicy:
     jump: float = 6.0
     noisy: float = 3.0
     sentinel_apart: float = 3.0
+    quietest: float = 1e-4
     least_noise: float = 0.3
 
 

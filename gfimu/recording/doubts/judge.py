@@ -203,7 +203,7 @@ def _of_samples(recording: Recording, array: AccelerometerArray | None, limits: 
     chips: dict[str, list[str]] = {}
     for name in names:
         chips.setdefault(name[:-1], []).append(name)
-    floor: Mapping[str, float] = {}
+    floor: Mapping[str, float] = dict.fromkeys(names, SamplePolicy().quietest if recording.unit == "m_s2" else 0.0)
     if limits is not None:
         floor = dict(zip(names, (SamplePolicy().least_noise * limits.noise).tolist(), strict=True))
     unit = "m/s²" if recording.unit == "m_s2" else ""
