@@ -83,6 +83,8 @@ class SamplePolicy:
         Equal readings in a row that show nothing yet [count]. By choice.
     chance : float
         Probability of a run of equal readings by chance from which the channel was frozen. By choice.
+    least_repeats : float
+        Share of readings that repeat the one before, at least assumed [ratio]. By choice: of fine steps few are seen.
     around : int
         Readings before and after a value that is held, which show whether the signal joins it [count]. By choice.
     jump : float
@@ -113,6 +115,7 @@ class SamplePolicy:
     garbage: int = 5
     longest_equal: int = 40
     chance: float = 1e-6
+    least_repeats: float = 0.05
     around: int = 6
     jump: float = 6.0
     noisy: float = 3.0
