@@ -83,7 +83,7 @@ ENDLESS = {
     "an open bracket": b"t,x [" + b" " * 60_000 + b"x,y\n" + b"0.1,1,2\n" * 9,
     "lines that begin with spaces": (b" " * 9_000 + b"1 2 3\n") * 400,
     "a log with a number of many digits": (b"[INFO] imu: 1 " + b"1" * 9_000 + b"x\n") * 400,
-    "a log of many marks": (b"a: " * 60 + b"1 " * 400 + b"x\n") * 400,
+    "a log of many marks": (b"a: " * 60 + b"1 " * 50 + b"x\n") * 400,
     "a word of many letters": (b"a" * 9_000 + b": 1 2 3x\n") * 400,
     "values to plot": (b">a:" + b"1" * 9_000 + b":x\n") * 400,
     "series of many words": (b"a," + b"1," * 9_000 + b"x\n") * 60,
