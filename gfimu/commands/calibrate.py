@@ -183,7 +183,7 @@ def calibrate(
     from gfimu.calibration.method import CalibrationTask, run_calibration
     from gfimu.calibration.registry import calibration_method
     from gfimu.calibration.run_file import open_references, open_uncalibrated
-    from gfimu.recording.checks import examine
+    from gfimu.recording.doubts.judge import examine, without_doubtful
 
     rests, known = poses or CalibrationPoses(), prior or CalibrationPrior()
     chosen = calibration_method("gyro-rate-table" if rate_table and method == "gyro" else method)
@@ -199,8 +199,7 @@ def calibrate(
 
     def checked(item: "RecordingLike") -> "Recording":
         read = open_uncalibrated(source_of(item), array=drawing)
-        examine(read, drawing, source=name_of(item), force=force)
-        return read
+        return without_doubtful(read, drawing, examine(read, drawing, source=name_of(item), force=force))
 
     others: Recording | None = None
     if "rate_table" in chosen.options:

@@ -265,7 +265,7 @@ def _read(
 ) -> "Recording":
     """Return the recording that one source, or a file per chip, holds."""
     from gfimu.recording.carried_array import carried_array
-    from gfimu.recording.checks import examine
+    from gfimu.recording.doubts.judge import examine
     from gfimu.recording.formats import open_recording
 
     first, *others = sources

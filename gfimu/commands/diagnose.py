@@ -181,7 +181,7 @@ def diagnose(
     """
     from gfimu.commands.opened import as_calibrated_run, as_calibration, as_runs, as_source, as_twin, names_of
     from gfimu.diagnosis.time_limit import limited_to
-    from gfimu.recording.checks import examine
+    from gfimu.recording.doubts.judge import examine
     from gfimu.recording.joining import displaced_reference
 
     if not time_limit > 0.0:

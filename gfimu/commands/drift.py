@@ -77,7 +77,7 @@ def drift_of_rest(
     True
     """
     from gfimu.budget.drift.rest_windows import rest_drift
-    from gfimu.recording.checks import examine
+    from gfimu.recording.doubts.judge import examine
 
     source = as_source(recording, array, column_map, max_memory=max_memory)
     run, geometry = as_calibrated_run(source, array, calibration)

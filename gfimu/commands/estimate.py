@@ -188,7 +188,7 @@ def estimate(
     from gfimu.motion.rest_bias import rest_bias as read_off
     from gfimu.rate.axis.few_motions import require_motions_of_samples
     from gfimu.recording.carried_array import warn_of_other_array
-    from gfimu.recording.checks import examine, without_dead_channels
+    from gfimu.recording.doubts.judge import examine, without_doubtful
     from gfimu.recording.timing.reference_times import reference_on_rows
 
     source = as_source(recording, array, column_map, max_memory=max_memory)
@@ -228,7 +228,7 @@ def estimate(
                 raise InputError(f"{option} has no use with --axis: the rate about one axis is all that is estimated")
         with naming(name_of(recording)):
             findings = examine(run, geometry, force=force, whose="")
-            alive = without_dead_channels(run, geometry, findings)
+            alive = without_doubtful(run, geometry, findings)
             if rest_bias and about.hub == "free":
                 raise InputError(
                     "biases can't be read off the rest of a free hub, as its inclination isn't known exactly"
@@ -240,6 +240,7 @@ def estimate(
                 at_rest=True if start == "rest" else None,
                 smooth=rate_method(method).uses_later_samples,
                 noise_std=noise_std,
+                findings=findings,
             )
     if out is not None:
         result.write(out)

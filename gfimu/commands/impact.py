@@ -59,7 +59,7 @@ def impact(
     from gfimu.base.units import STANDARD_GRAVITY
     from gfimu.commands.opened import as_calibrated_run, as_source, name_of
     from gfimu.motion.impact.event import ImpactSettings, measure_impact
-    from gfimu.recording.checks import examine
+    from gfimu.recording.doubts.judge import examine
 
     settings = ImpactSettings(cfc, standard, threshold_g * STANDARD_GRAVITY, direction=direction or "")
     source = as_source(recording, array, column_map, max_memory=max_memory)

@@ -53,7 +53,7 @@ def join(
     """
     from gfimu.base.files.memory import with_memory
     from gfimu.commands.opened import as_array, as_source, name_of
-    from gfimu.recording.checks import examine
+    from gfimu.recording.doubts.judge import examine
     from gfimu.recording.formats import open_recording
     from gfimu.recording.importing import load_map
     from gfimu.recording.joining import ReferenceSeries, join_reference, open_reference

@@ -76,7 +76,7 @@ def noise(
     from gfimu.base.files.atomic_file import write_text
     from gfimu.calibration.run_file import open_calibrated
     from gfimu.commands.opened import as_array, as_calibrated_run, as_calibration, as_source, name_of
-    from gfimu.recording.checks import examine
+    from gfimu.recording.doubts.judge import examine, without_doubtful
     from gfimu.sensor_noise import kalibr_yaml, recording_noise
 
     known = as_known_axis(axis)
@@ -84,7 +84,7 @@ def noise(
     source = as_source(recording, array, column_map, max_memory=max_memory)
     run = open_calibrated(source, unit)
     drawing = None if array is None else as_array(array)
-    examine(run, drawing, source=name_of(recording), force=force)
+    run = without_doubtful(run, drawing, examine(run, drawing, source=name_of(recording), force=force))
     result = recording_noise(run, stretch=stretch, rest_threshold=rest_threshold)
     if known.axis is not None or array is not None or "[turning_axis]" in str(run.metadata.get("array_toml", "")):
         from gfimu.rate.axis.accuracy.noise import axis_noise

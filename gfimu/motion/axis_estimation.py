@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -22,7 +23,8 @@ from gfimu.rate.axis.recursion import smooth_axis
 from gfimu.rate.axis.rest import begins_at_rest
 from gfimu.recording import Recording
 from gfimu.recording.carried_array import array_metadata
-from gfimu.recording.clipping import without_clipped
+from gfimu.recording.doubts.doubt import Doubt
+from gfimu.recording.doubts.judge import doubts_of, without_doubtful
 
 __all__ = ["estimate_about_axis"]
 
@@ -38,6 +40,7 @@ def estimate_about_axis(
     at_rest: bool | None = None,
     smooth: bool = False,
     noise_std: ArrayLike | None = None,
+    findings: Sequence[Doubt] | None = None,
 ) -> Estimate:
     """Estimate a rotation about one known axis, with as few as one tri-axial chip.
 
@@ -57,6 +60,8 @@ def estimate_about_axis(
     noise_std : array_like, scalar or shape (c,), optional
         Standard deviation of one sample of each channel, m/s²; by default from the parts' data sheets. Its scale is
         learnt from the innovations.
+    findings : sequence of Doubt, optional
+        What `gfimu.recording.doubts.judge.doubts_of` found, if it was run already.
 
     Returns
     -------
@@ -73,7 +78,8 @@ def estimate_about_axis(
     require_visible(array, axis)
     if len(recording) < 20:
         raise InputError("a recording of fewer than twenty samples shows no rotation; record longer")
-    recording, clipped = without_clipped(recording, array)
+    doubts = doubts_of(recording, array) if findings is None else findings
+    recording = without_doubtful(recording, array, doubts)
     t, y = recording.t_s, np.ascontiguousarray(recording.for_array(array))
     noise = white_noise_std(array, recording.sample_rate) if noise_std is None else np.asarray(noise_std, dtype=float)
     noise = np.ascontiguousarray(np.broadcast_to(noise, array.n_channels))
@@ -93,6 +99,7 @@ def estimate_about_axis(
     u = axis.direction
     omega, alpha = np.outer(states[:, 1], u), np.outer(states[:, 2], u)
     std = np.sqrt(np.maximum(variance, 0.0))
+    warnings = [one.text for one in doubts if one.is_no_reading]
     left = y - channels.offset - np.outer(states[:, 2], channels.by_acceleration)
     left = left - np.outer(states[:, 1] ** 2, channels.by_square)
     products = np.column_stack(
@@ -122,7 +129,7 @@ def estimate_about_axis(
             "sign_log_odds": fit.sign_log_odds if np.isfinite(fit.sign_log_odds) else None,
             "mean_normalised_innovation_squared": mean_square,
             **({} if mounted is None else {"mounting": mounted.to_dict()}),
-            "warnings": [*(one.text for one in clipped), *([] if sign == "decided" else [undecided])],
+            "warnings": [*warnings, *([] if sign == "decided" else [undecided])],
             "channels_left_out": [],
             "mounting_rotvec_rad": recording.mounting_rotvec.tolist(),
             "format_version": FORMAT_VERSION,

@@ -35,8 +35,8 @@ from gfimu.rate.sensing import SensorErrors, calibrated_bias_std, step_of_readin
 from gfimu.rate.solve import solve_rate
 from gfimu.recording import Recording
 from gfimu.recording.carried_array import array_metadata
-from gfimu.recording.checks import Finding, check_recording, refuse_or_warn, without_dead_channels
-from gfimu.recording.clipping import without_clipped
+from gfimu.recording.doubts.doubt import Doubt
+from gfimu.recording.doubts.judge import dead_channels, doubts_of, refuse_or_warn, without_doubtful
 
 __all__ = ["Estimate", "estimate"]
 
@@ -59,7 +59,7 @@ def estimate(
     use: Sequence[str] = (),
     force: bool = False,
     keep_faulty: bool = False,
-    findings: Sequence[Finding] | None = None,
+    findings: Sequence[Doubt] | None = None,
     progress: Callable[[float], object] | None = None,
 ) -> Estimate:
     """Estimate p, α, ω, attitude and table angle at every sample of a recording.
@@ -100,8 +100,8 @@ def estimate(
         Use every channel, without looking for faulty ones. By default recursive methods leave out channels
         that contradict the others, while they do so (`gfimu.rate.health`): from the first sample after a rest, else
         from when the rate has settled.
-    findings : sequence of Finding, optional
-        What `gfimu.recording.checks.check_recording` found, if it was run already.
+    findings : sequence of Doubt, optional
+        What `gfimu.recording.doubts.judge.doubts_of` found, if it was run already.
     progress : callable, optional
         Called with the share of the work that recursive methods have done so far, 0 to 1.
 
@@ -120,11 +120,10 @@ def estimate(
         If the array can't see all six motions; the message names those it can't.
     """
     chosen = rate_method(method)
-    found = refuse_or_warn(check_recording(recording, array) if findings is None else findings, force=force)
-    recording = without_dead_channels(recording, array, found)
+    found = refuse_or_warn(doubts_of(recording, array) if findings is None else findings, force=force)
+    recording = without_doubtful(recording, array, [one for one in found if one.kind != "clipped"])
     missing = np.isnan(recording.for_array(array))  # (n, c)
-    recording, clipped = without_clipped(recording, array)
-    found = (*found, *clipped)
+    recording = without_doubtful(recording, array, found)
     readings = recording.for_array(array)
     saturated = np.isnan(readings) & ~missing
     rate0 = None if omega0 is None else np.asarray(omega0, dtype=float)
@@ -159,7 +158,8 @@ def estimate(
         array, recording.t_s, readings, errors, calibrated_bias_std(recording.metadata, array) is not None,
         linear, rate0, references, temperature, path_start, levelled, progress,
     )  # fmt: skip
-    dead = [name for finding in found if finding.kind == "dead" for name in finding.channels]
+    dead = dead_channels(found)
+    warnings = [one.text for one in found if not one.is_minor]
     at_rest = chosen.open_loop if rate0 is None else not rate0.any()
     if earth is not None and at_rest:  # at rest a body turns with the Earth
         first = _initial_attitude(recording, linear.motion, np.zeros((len(readings), 3)), quaternion0)
@@ -196,7 +196,7 @@ def estimate(
             "method": method,
             "form": linear.form,
             **rate.remarks,
-            "warnings": [finding.text for finding in found] + used.sentences(array) + rate.sentences(),
+            "warnings": [*warnings, *used.sentences(array), *rate.sentences()],
             "health": None if used.watch is None else used.watch.to_dict(),
             "faults": [entry for fault in used.faults(array) for entry in fault.entries()],
             "channels_left_out": dead,

@@ -28,7 +28,8 @@ from gfimu.base.units import MILLI_G, STANDARD_GRAVITY
 from gfimu.motion.estimate import Estimate
 from gfimu.motion.estimation import estimate
 from gfimu.recording import Recording
-from gfimu.recording.checks import Finding, check_recording, refuse_or_warn, without_dead_channels
+from gfimu.recording.doubts.doubt import Doubt
+from gfimu.recording.doubts.judge import dead_channels, doubts_of, refuse_or_warn, without_doubtful
 from gfimu.recording.rest import Rest, detect_rest, mean_variance_factor
 
 __all__ = ["ForceAtRest", "RestBias", "estimate_from_rest", "force_at_rest", "rest_bias"]
@@ -63,7 +64,7 @@ class RestBias:
         readings = recording.for_array(self.array) - self.bias
         return replace(recording, readings=readings, channels=self.array.channels)
 
-    def findings(self) -> tuple[Finding, ...]:
+    def findings(self) -> tuple[Doubt, ...]:
         """Return the channel whose bias exceeds its data sheet's limit most, as a reason to refuse; empty if none does.
 
         Parts without a data sheet are not judged.
@@ -84,7 +85,7 @@ class RestBias:
             f"its data sheet allows {limit[worst] / MILLI_G:.0f} mg{others}: the table is not level or the mounting "
             "another, the unit, order, sign or array is wrong, the body turned, or the chip is damaged"
         )
-        return (Finding("rest_bias", text, True, (self.array.channels[worst],)),)
+        return (Doubt("rest_bias", text, True, (self.array.channels[worst],)),)
 
 
 @dataclass(frozen=True)
@@ -291,9 +292,9 @@ def estimate_from_rest(
     >>> gfimu.estimate_from_rest(run, run.array)
     Estimate(cube12, integrate, 3000 samples, 29.99 s at 100 Hz)
     """
-    findings = refuse_or_warn(check_recording(recording, array), force=force)
-    recording = without_dead_channels(recording, array, findings)
-    dead = [name for finding in findings if finding.kind == "dead" for name in finding.channels]
+    findings = refuse_or_warn(doubts_of(recording, array), force=force)
+    recording = without_doubtful(recording, array, findings)
+    dead = dead_channels(findings)
     found = rest_bias(recording, array, gravity=gravity, without=dead)
     findings += refuse_or_warn(found.findings(), force=force)
     result = estimate(

@@ -24,7 +24,7 @@ from gfimu.rate.result import RateEstimate
 from gfimu.rate.sensing import SensorErrors
 from gfimu.rate.settings import FilterSettings
 from gfimu.recording import Recording
-from gfimu.recording.checks import examine
+from gfimu.recording.doubts.judge import examine
 from gfimu.recording.quantities import GYRO_COLUMNS, READING_UNITS
 from gfimu.recording.tables.column_file import head_line
 
@@ -204,7 +204,7 @@ def examined_lines(
     rate : float
         Nominal sample rate, Hz.
     force : bool
-        Whether to go on where the checks refuse the samples (`gfimu.recording.checks`).
+        Whether to go on where the checks refuse the samples (`gfimu.recording.doubts`).
     """
     wanted = min(max(_FEWEST, round(_START_S * rate)), _MOST)
     head: list[str] = []

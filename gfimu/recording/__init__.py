@@ -2,7 +2,7 @@
 
 In: gfimu's files, and those of other loggers by a map of their columns (`importing`); references on clocks of their
 own (`joining`).
-Out: `Recording` with its array and times, and what is doubtful in it (`checks`, `evidence`, `timing`).
+Out: `Recording` with its array and times, and what is doubtful in it (`doubts`, `evidence`, `timing`).
 """
 
 from typing import TYPE_CHECKING
@@ -11,8 +11,11 @@ from gfimu.base.lazy_names import declared_names
 
 if TYPE_CHECKING:
     from gfimu.recording.carried_array import array_difference, array_metadata
-    from gfimu.recording.checks import check_recording
-    from gfimu.recording.clipping import without_clipped
+    from gfimu.recording.doubts.doubt import Doubt
+    from gfimu.recording.doubts.judge import doubts_of, without_doubtful
+    from gfimu.recording.doubts.rails import rails_of
+    from gfimu.recording.doubts.samples import sample_doubts
+    from gfimu.recording.doubts.stamps import stamp_doubts, steady_clock
     from gfimu.recording.evidence.reference_rate import odd_rates
     from gfimu.recording.formats import open_run
     from gfimu.recording.importing import inspect_file
@@ -20,7 +23,6 @@ if TYPE_CHECKING:
     from gfimu.recording.importing.column_map import ColumnSpec, TextSpec
     from gfimu.recording.importing.dates import nanoseconds_of
     from gfimu.recording.importing.notation import factor_of
-    from gfimu.recording.importing.oddities import oddities, rails_of
     from gfimu.recording.importing.piece import nearest_rows
     from gfimu.recording.importing.readers import read_foreign
     from gfimu.recording.importing.readers.registry import format_of

@@ -19,7 +19,7 @@ from gfimu.motion.estimation import estimate
 from gfimu.motion.rest_bias import estimate_from_rest, rest_bias
 from gfimu.recording import Recording
 from gfimu.recording.carried_array import carried_array, warn_of_other_array
-from gfimu.recording.checks import examine
+from gfimu.recording.doubts.judge import examine
 from gfimu.recording.formats import is_estimate, open_run
 from gfimu.recording.mapped import MappedFile
 from gfimu.recording.tables.arrow import ArrowStream

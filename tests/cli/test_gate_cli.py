@@ -11,8 +11,8 @@ import pytest
 import gfimu
 from gfimu import InputError, RecordingWarning
 from gfimu.commands.diagnose import EXPLAINED
-from gfimu.recording import check_recording
-from gfimu.recording.checks import examine
+from gfimu.recording import doubts_of
+from gfimu.recording.doubts.judge import examine
 
 G = 9.80665
 CUBE = gfimu.AccelerometerArray.load("cube12")
@@ -131,22 +131,22 @@ def test_another_array_than_the_recording_states_is_a_warning(sound):
 def test_poses_turned_over_do_not_hide_a_wrong_unit():
     """A body in the hand is not upright at every rest, whatever its mounting says."""
     poses = gfimu.simulate("calibration_poses", seed=5)
-    assert check_recording(poses, CUBE) == ()
+    assert doubts_of(poses, CUBE) == ()
     for words, spoil in WRONG.items():
-        found = [one.text for one in check_recording(spoil(poses), CUBE) if one.refused]
+        found = [one.text for one in doubts_of(spoil(poses), CUBE) if one.refused]
         assert any(words in text for text in found) or words.startswith("column"), words
 
 
 def test_a_pendulum_is_checked_though_its_axis_is_level():
     swing = gfimu.simulate("pendulum", seed=5)
     array = swing.array
-    assert check_recording(swing, array) == ()
-    assert [one.kind for one in check_recording(in_g(swing), array)] == ["unit"]
-    assert [one.kind for one in check_recording(one_chip_in_g(swing), array)] == ["chip_unit"]
+    assert doubts_of(swing, array) == ()
+    assert [one.kind for one in doubts_of(in_g(swing), array)] == ["unit"]
+    assert [one.kind for one in doubts_of(one_chip_in_g(swing), array)] == ["chip_unit"]
 
 
 def test_a_diagnosis_refuses_only_what_it_can_not_explain(sound):
-    assert {one.kind for one in check_recording(exchanged(sound), CUBE)} <= EXPLAINED
+    assert {one.kind for one in doubts_of(exchanged(sound), CUBE)} <= EXPLAINED
     with pytest.raises(InputError, match="fitted and held out"):
         gfimu.diagnose(sound, "cube12_turntable", held_out=[sound])
 

@@ -68,12 +68,14 @@ try:
 except SystemExit as stop:
     assert not stop.code
 unused = ("pandas", "scipy.signal", "scipy.optimize", "scipy.interpolate", "matplotlib")
-print(*(name for name in unused if name in sys.modules), file=sys.stderr)
+print("loaded:", *(name for name in unused if name in sys.modules))
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "out.parquet").exists()
-    assert done.stderr.strip() == ""
+    assert done.stdout.splitlines()[-1] == "loaded:"
+    other = [line for line in done.stderr.splitlines() if "estimating by ml" not in line]  # where kernels compile
+    assert other == []
 
 
 HEAVY = ("numpy", "scipy", "numba", "pyarrow", "mujoco", "rerun", "matplotlib", "sim", "firmware_bridge")

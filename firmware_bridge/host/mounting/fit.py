@@ -11,7 +11,8 @@ from firmware_bridge.host.record_report import RecordReport
 from firmware_bridge.host.record_session import Batch
 from gfimu.array.array import AccelerometerArray
 from gfimu.recording import Recording
-from gfimu.recording.checks import Finding, check_recording
+from gfimu.recording.doubts.doubt import Doubt
+from gfimu.recording.doubts.judge import doubts_of
 
 __all__ = ["FirstSamples", "array_doubts"]
 
@@ -31,13 +32,13 @@ class FirstSamples:
             self._batches.append(batch)
             self._count += len(batch.t_s)
 
-    def findings(self, array: AccelerometerArray, lsb: float) -> tuple[Finding, ...]:
-        """Return what contradicts an array (`gfimu.recording.checks`); ``lsb``: size of a count, m/s²."""
+    def findings(self, array: AccelerometerArray, lsb: float) -> tuple[Doubt, ...]:
+        """Return what contradicts an array (`gfimu.recording.doubts`); ``lsb``: size of a count, m/s²."""
         if not self._batches:
             return ()
         t: NDArray[np.float64] = np.concatenate([batch.t_s for batch in self._batches])[:_KEPT]
         counts = np.concatenate([batch.counts for batch in self._batches])[:_KEPT]
-        return check_recording(Recording(t, lsb * counts, array.channels), array)
+        return doubts_of(Recording(t, lsb * counts, array.channels), array)
 
 
 def array_doubts(
@@ -60,7 +61,7 @@ def array_doubts(
         lsb = form.count_size(AccelerometerArray.load(form.array))
         return [_open_array_text(candidate_arrays(form), samples, lsb, str(report.path))]
     array = known or AccelerometerArray.load(report.array)  # one that was stated late is a shipped one
-    texts = [finding.text for finding in samples.findings(array, form.count_size(array))]
+    texts = [finding.text for finding in samples.findings(array, form.count_size(array)) if not finding.is_minor]
     if not report.board_array or report.board_array == array.name:
         return texts
     other = (

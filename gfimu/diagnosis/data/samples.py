@@ -12,7 +12,8 @@ from scipy.special import ndtr
 from gfimu.base.difference_noise import difference_noise
 from gfimu.diagnosis.data.run import Run
 from gfimu.diagnosis.policy import Policy
-from gfimu.recording.importing.oddities import BEYOND_PILE, LONGEST_EQUAL, is_within_range
+from gfimu.recording.doubts.rails import is_within_range
+from gfimu.recording.policy import SamplePolicy
 
 __all__ = [
     "channel_spikes",
@@ -54,14 +55,14 @@ def frozen_stretches(
         edges.append(np.concatenate([[-1], change, [len(mine) - 1]]))
         lengths = np.diff(edges[-1])
         # How much the channel usually changes: away from the stretches in question.
-        alive = np.repeat(lengths <= LONGEST_EQUAL, lengths) & valid
+        alive = np.repeat(lengths <= SamplePolicy.longest_equal, lengths) & valid
         usual.append(float(np.median(np.abs(np.diff(mine[alive])))) if alive.sum() > 10 else np.nan)
     # A channel that was dead all through would have changed like the quietest of the others.
     quietest = 0.0 if np.isnan(usual).all() else float(np.nanmin(usual))
     for channel in range(run.readings.shape[1]):
         mine = run.readings[:, channel]
         changes = quietest if np.isnan(usual[channel]) else usual[channel]
-        for place in np.flatnonzero(np.diff(edges[channel]) > LONGEST_EQUAL):
+        for place in np.flatnonzero(np.diff(edges[channel]) > SamplePolicy.longest_equal):
             start, stop = int(edges[channel][place]) + 1, int(edges[channel][place + 1]) + 1
             moving = float(np.ptp(prediction[start:stop, channel])) > 2.5 * quantum
             if not run.valid[start:stop, channel].any():
@@ -100,7 +101,7 @@ def is_at_extreme(run: Run, stretch: tuple[int, int, int], step: float, noise: f
     channel, start, stop = stretch
     away = run.readings[run.valid[:, channel], channel] - run.readings[start, channel]
     beyond = min(np.sum(away > 0.5 * step), np.sum(away < -0.5 * step))
-    return bool(np.ptp(away) > _MOVES * max(noise, step) and beyond <= BEYOND_PILE * (stop - start))
+    return bool(np.ptp(away) > _MOVES * max(noise, step) and beyond <= SamplePolicy.beyond_pile * (stop - start))
 
 
 def _spread_of_others(run: Run, channel: int, start: int, stop: int, quantum: float) -> float:
@@ -123,7 +124,7 @@ def _spread_of_others(run: Run, channel: int, start: int, stop: int, quantum: fl
 def _least_equal(spread: float, quantum: float, readings: int) -> float:
     """Return how many equal readings in a row noise of a ``spread`` leaves to chance in a run of so many readings."""
     same = np.log(2.0 * ndtr(0.5 * quantum / max(spread, _LEAST_NOISE * quantum)) - 1.0)  # of one reading more
-    return max(float((np.log(Policy.chance) - np.log(readings)) / same), LONGEST_EQUAL)
+    return max(float((np.log(Policy.chance) - np.log(readings)) / same), SamplePolicy.longest_equal)
 
 
 def frozen_fault(
@@ -132,7 +133,7 @@ def frozen_fault(
     """Return the longest frozen stretch, with every channel that was frozen with it, and a sentence about all."""
     _, start, stop = max(frozen, key=lambda one: one[2] - one[1])
     # A value that happens to be read again lengthens a channel's stretch.
-    together = [one for one in frozen if max(abs(one[1] - start), abs(one[2] - stop)) < LONGEST_EQUAL]
+    together = [one for one in frozen if max(abs(one[1] - start), abs(one[2] - stop)) < SamplePolicy.longest_equal]
     channels = [names[channel] for channel, _, _ in together]
 
     def span(first: int, end: int) -> str:

@@ -26,8 +26,7 @@ from gfimu.diagnosis.design.proposal import SEPARATED
 from gfimu.diagnosis.policy import Policy
 from gfimu.model.world_model import WorldModel, is_linear, reads_place
 from gfimu.recording import Recording
-from gfimu.recording.checks import check_recording
-from gfimu.recording.importing.oddities import oddities
+from gfimu.recording.doubts.judge import doubts_of
 
 __all__ = ["CheckedRun", "EffectView", "RunCheck", "UsefulRun", "check_runs", "turns_one_way"]
 
@@ -240,12 +239,7 @@ def check_runs(
     """
     findings: list[str] = []
     for recording, name in zip(recordings, names, strict=True):
-        findings += [f"{name}: {one.text}" for one in check_recording(recording, model.array)]
-        readings = recording.for_array(model.array)
-        odd = oddities(dict(zip(model.array.channels, readings.T, strict=True)))
-        findings += [f"{name}: {one}" for one in odd]
-        if len(recording.gaps):
-            findings.append(f"{name}: {len(recording.gaps)} gaps in its times")
+        findings += [f"{name}: {one.text}" for one in doubts_of(recording, model.array)]
     seen = tuple(_with_temperature(name, one) for name, one in zip(names, recordings, strict=True))
     if model.drive_source == "gyro":
         return RunCheck(seen, tuple(findings), (), ())

@@ -15,11 +15,13 @@ from gfimu.base.declared import Declared, FileText, Line, figure
 from gfimu.base.declared import table as table_of
 from gfimu.base.errors import InputError, one_line
 from gfimu.base.results import TableResult, columns_of, text_column
+from gfimu.recording.doubts.doubt import Doubt
+from gfimu.recording.doubts.samples import sample_doubts
+from gfimu.recording.doubts.stamps import stamp_doubts
 from gfimu.recording.importing.clock import Times, times_of
 from gfimu.recording.importing.column_map import ColumnMap, TimeSpec, map_toml
 from gfimu.recording.importing.guessing.likely_reference import likely_references
 from gfimu.recording.importing.guessing.suggestion import roles_by_map, suggest, with_shipped
-from gfimu.recording.importing.oddities import oddities
 from gfimu.recording.importing.raw_table import RawFile, RawTable
 from gfimu.recording.importing.readers import read_foreign
 from gfimu.recording.importing.readers.tables import table_file
@@ -73,11 +75,21 @@ class Inspection(Declared, TableResult):
         tuple[str, ...],
         figure("Column maps that come with gfimu and fit, the most plausible first.", key="fitting_maps", head="maps"),
     ] = ()
-    findings: Annotated[tuple[str, ...], figure("What is odd: gaps, rails, corrupt values, noisy channels.")] = ()
+    notes: tuple[str, ...] = ()
+    doubts: Annotated[tuple[Doubt, ...], figure("What is doubtful in its times and readings.")] = ()
     reasons: Annotated[tuple[str, ...], figure("What the proposed map rests on, one line each.")] = ()
     column_map: ColumnMap | None = None
     is_own: bool = False
     shows_map: bool = True
+
+    @property
+    def findings(
+        self,
+    ) -> Annotated[
+        tuple[str, ...], figure("What is odd: gaps, rails, corrupt values, noisy channels.", before="doubts")
+    ]:
+        """What was left out on reading, and what is doubtful, one line each."""
+        return (*self.notes, *(one.text for one in self.doubts))
 
     @property
     def map_toml(
@@ -162,9 +174,10 @@ def inspect_file(path: str | Path | ArrowStream, *, table: str = "") -> Inspecti
         reasons = (f"the map {fitting[0]} that comes with gfimu fits: columns, rate, gravity at rest", *differences)
         time, is_rate_known = suggested.time, True
         roles = roles_by_map(suggested, found.table)
-    times, findings = _times(found.table, time, raw.source)
-    findings += [note.removeprefix(f"{raw.source}: ") for note in found.table.notes]
-    findings += oddities({name: one.numbers(name) for one, triad in found.chips for name in triad.columns})
+    times, notes, doubts = _times(found.table, time, raw.source)
+    notes += [note.removeprefix(f"{raw.source}: ") for note in found.table.notes]
+    columns = {name: one.numbers(name) for one, triad in found.chips for name in triad.columns}
+    doubts += sample_doubts(columns, [triad.columns for _, triad in found.chips])
     return Inspection(
         source=raw.source,
         format=raw.format,
@@ -175,7 +188,8 @@ def inspect_file(path: str | Path | ArrowStream, *, table: str = "") -> Inspecti
         chips=len(found.chips),
         columns=tuple(_view(found.table, name, roles.get(name, "")) for name in found.table.columns),
         fitting=fitting,
-        findings=tuple(findings),
+        notes=tuple(notes),
+        doubts=tuple(doubts),
         reasons=reasons,
         column_map=suggested,
     )
@@ -190,11 +204,11 @@ def _own_recording(raw: RawFile, table: RawTable, chips: dict[str, list[str]]) -
     further = {name: values for name, values in table.columns.items() if name not in roles}
     likely = [one for one in likely_references(further) if reference_quantity(one.reference) not in have]
     roles |= {one.column: f"{reference_quantity(one.reference)}? {one.unit}" for one in likely}
-    times, findings = _times(table, TimeSpec("t_s"), raw.source, drop=("duplicates", "unordered"))
-    findings += [f"{one.reference} is not there; {one.remedy}" for one in likely]
+    times, notes, doubts = _times(table, TimeSpec("t_s"), raw.source, drop=("duplicates", "unordered"))
+    notes += [f"{one.reference} is not there; {one.remedy}" for one in likely]
     if times is not None and times.dropped:
-        findings.append("with such rows it is refused; gfimu convert --drop duplicates,unordered leaves them out")
-    findings += oddities({name: table.numbers(name) for name in channels})
+        notes.append("with such rows it is refused; gfimu convert --drop duplicates,unordered leaves them out")
+    doubts += sample_doubts({name: table.numbers(name) for name in channels}, list(chips.values()))
     return Inspection(
         source=raw.source,
         format=raw.format,
@@ -204,7 +218,8 @@ def _own_recording(raw: RawFile, table: RawTable, chips: dict[str, list[str]]) -
         sample_rate_hz=_rate(times),
         chips=len(chips),
         columns=tuple(_view(table, name, roles.get(name, "")) for name in table.columns),
-        findings=tuple(findings),
+        notes=tuple(notes),
+        doubts=tuple(doubts),
         reasons=("its columns carry their units: a recording of gfimu's, which needs no column map",),
         is_own=True,
     )
@@ -229,23 +244,13 @@ def _view(table: RawTable, name: str, role: str) -> ColumnView:
     return ColumnView(name, float(known.min()), float(known.max()), float(np.median(known)), missing, role)
 
 
-def _times(table: RawTable, spec: TimeSpec, source: str, *, drop: Sequence[str] = ()) -> tuple[Times | None, list[str]]:
-    """Return the times of a table, and what is odd about them."""
+def _times(
+    table: RawTable, spec: TimeSpec, source: str, *, drop: Sequence[str] = ()
+) -> tuple[Times | None, list[str], list[Doubt]]:
+    """Return the times of a table, what was left out for them, and what is odd about them."""
     try:
         times = times_of(table, spec, source, drop=drop)
     except InputError as error:
-        return None, [str(error).removeprefix(f"{source}: ")]
-    found = [note.removeprefix(f"{source}: ") for note in times.notes]
-    if spec.column is None or len(times.t_s) < 3:
-        return times, found
-    steps = np.diff(times.t_s)
-    usual = float(np.median(steps))
-    gaps = steps > 1.5 * usual
-    if gaps.any():
-        lost = float(np.sum(steps[gaps] - usual))
-        place = times.t_s[int(np.argmax(gaps))] - times.t_s[0]
-        found.append(f"{int(gaps.sum())} gaps, {lost:.3g} s in all, the first {place:.4g} s after the start")
-    jitter = float(np.std(steps[~gaps]) / usual)
-    if jitter > 0.02:
-        found.append(f"the sample period scatters by {100 * jitter:.2g}% of itself")
-    return times, found
+        return None, [str(error).removeprefix(f"{source}: ")], []
+    notes = [note.removeprefix(f"{source}: ") for note in times.notes]
+    return times, notes, [] if spec.column is None else stamp_doubts(times.t_s)

@@ -26,6 +26,8 @@ ANGLE = {"rad": 1.0, "mrad": 1e-3, "deg": _DEGREE, "rev": math.tau}
 TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "d": 86400.0}
 TEMPERATURE = {"degc": 1.0}
 LENGTH = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
+FIELD = {"ut": 1e-6, "mt": 1e-3, "nt": 1e-9, "gauss": 1e-4, "mgauss": 1e-7}
+PRESSURE = {"pa": 1.0, "hpa": 1e2, "kpa": 1e3, "mbar": 1e2}
 SPEED = {"m/s": 1.0, "mm/s": 1e-3, "mm/min": 1e-3 / 60.0}
 
 _KINDS = {
@@ -36,6 +38,8 @@ _KINDS = {
     "temperature": TEMPERATURE,
     "length": LENGTH,
     "speed": SPEED,
+    "field": FIELD,
+    "pressure": PRESSURE,
 }
 _SAME = {
     "m/s/s": "m/s2",
@@ -88,8 +92,10 @@ _SAME = {
     "c": "degc",
     "celsius": "degc",
 }
-_ENDS = re.compile(r"^(.*?[A-Za-z0-9\]])[_ ,.]+(m_s2|mm_s2|cm_s2|rad_s|deg_s|[A-Za-zµ°/²^]+[0-9]?)$")
-_WORDS = {"g", "s", "h", "d", "c", "min", "gs", "day", "hz", "rev", "turn", "turns", "second", "gal"}
+_AMBIGUOUS = {"g", "s", "h", "d", "c", "min", "gs", "day", "hz", "rev", "turn", "turns", "second", "gal"}
+_WORD = re.compile(r"[^_ ,.]+")
+_JOINTS = "_ ,."
+_MOST_WORDS = 4  # numerical: deg_per_second, m_per_s_squared
 _BRACKETS = re.compile(r"[\[({]((?:[^\[\](){}]|\([^\[\](){}]*\))+)[\])}]$")
 
 
@@ -100,7 +106,16 @@ def _plain(text: str) -> str:
     )
     short = short.replace("°c", "degc").replace("°", "deg").replace("^", "").replace("*", "").replace("·", "")
     short = re.sub(r"[\s()]", "", short)
-    return _SAME.get(short, short)
+    return _SAME.get(short) or _SAME.get(_joined(short), _joined(short))
+
+
+def _joined(short: str) -> str:
+    """Return a unit in words as its sign: ``deg_per_s`` as ``deg/s``, ``m_per_second_squared`` as ``m/s2``."""
+    plain = re.sub(r"_?per_?|_/_?|/_", "/", short)
+    plain = re.sub(r"(?<=/)(?:seconds?|sec)(?![a-z])", "s", plain)
+    plain = re.sub(r"_?(?:squared|sq|\*\*2)$", "2", re.sub(r"(?<=/)(?:s_?s|s/s)$", "s2", plain))
+    plain = re.sub(r"^(?:degrees?)(?=/)", "deg", re.sub(r"^(?:radians?)(?=/)", "rad", plain))
+    return re.sub(r"^(?:met(?:er|re)s?)(?=/)", "m", plain)
 
 
 def factor_of(unit: str, kind: str, *, where: str = "") -> float:
@@ -152,7 +167,9 @@ def unit_of_name(name: str) -> tuple[str, str]:
     plain, unit = bracketed_unit(name)
     if unit:
         return plain, unit
-    found = _ENDS.match(name.strip())
-    if found is None or found[2].lower() in _WORDS or not kind_of(found[2]):
-        return plain, ""
-    return found[1], found[2]
+    words = list(_WORD.finditer(plain))
+    for first in words[-_MOST_WORDS:]:
+        unit = plain[first.start() :]
+        if first.start() and plain[first.start() - 1] in _JOINTS and unit.lower() not in _AMBIGUOUS and kind_of(unit):
+            return plain[: first.start()].rstrip(_JOINTS), unit
+    return plain, ""

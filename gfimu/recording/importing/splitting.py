@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.base.errors import InputError
+from gfimu.recording.importing.dates import nanoseconds_of
 from gfimu.recording.importing.raw_table import RawFile, RawTable
 
-__all__ = ["find_split", "split_file"]
+__all__ = ["Split", "find_split", "split_file"]
 
 _MOST_CHIPS = 64
 _LEAST_SHARE = 0.1  # of the rows of the most frequent value, below which a value is a mistake or a message
@@ -52,11 +55,28 @@ def split_file(raw: RawFile, column: str | int, source: str, *, wanted: Collecti
     return RawFile(raw.source, raw.format, tables)
 
 
-def find_split(table: RawTable, times: str | None) -> str | None:
-    """Return the column that names the chip of each row; None where each row has all chips.
+@dataclass(frozen=True)
+class Split:
+    """A column whose values divide the rows of a table.
 
-    It has few values, each in many rows, and the time increases within each but not over all rows; or it is called
-    like a chip, its values take turns, and each of them has rows enough.
+    Parameters
+    ----------
+    column : str
+        Its name.
+    is_part : bool
+        Whether its values name parts of a recording, one after the other, and not chips.
+    """
+
+    column: str
+    is_part: bool = False
+
+
+def find_split(table: RawTable, times: str | None) -> Split | None:
+    """Return the column that names the chip or the part of each row; None where each row has all chips.
+
+    That of chips has few values, each in many rows, and the time increases within each but not over all rows; or it is
+    called like a chip, its values take turns, and each of them has rows enough. That of parts is text, each of its
+    values stands in one block of rows, and the time does not go on from block to block.
 
     Parameters
     ----------
@@ -72,10 +92,15 @@ def find_split(table: RawTable, times: str | None) -> str | None:
         counts = np.bincount(places[places >= 0], minlength=len(values))
         if not 2 <= len(values) <= _MOST_CHIPS or counts.min() < max(20, _LEAST_SHARE * counts.max()):
             continue
-        turns = float(np.mean(np.diff(places) != 0))
+        edges = np.flatnonzero(np.diff(places) != 0)
+        turns = len(edges) / max(len(places) - 1, 1)
         named = _NAMES.search(name) is not None
         if (named and turns > 0.3) or ((named or turns > 0.3) and times is not None and _sorts(table, times, places)):
-            return name
+            return Split(name)
+        if column.dtype == object and times and len(edges) == len(values) - 1 and not nanoseconds_of(column)[1].all():
+            steps = np.diff(_increasing(table, times).astype(float))
+            if np.all(np.abs(steps[edges] - np.median(steps)) > np.median(steps)):
+                return Split(name, is_part=True)
     return None
 
 
@@ -96,13 +121,17 @@ def _values(table: RawTable, name: str, wanted: Collection[str] = ()) -> tuple[l
     return [str(values[place]) for place in order], np.asarray(number[places], dtype=np.int64)
 
 
-def _sorts(table: RawTable, times: str, places: NDArray[np.int64]) -> bool:
-    """Whether the times increase within each chip, but not over all rows."""
+def _increasing(table: RawTable, times: str) -> NDArray[Any]:
+    """Return a column of times as numbers that increase with the time, (n,), in any unit."""
     t = table.columns[times]
     if t.dtype == object or t.dtype.kind == "M":
-        from gfimu.recording.importing.dates import nanoseconds_of
+        return nanoseconds_of(t)[0] if t.dtype == object else t.astype(np.int64)
+    return t
 
-        t = nanoseconds_of(t)[0] if t.dtype == object else t.astype(np.int64)
+
+def _sorts(table: RawTable, times: str, places: NDArray[np.int64]) -> bool:
+    """Whether the times increase within each chip, but not over all rows."""
+    t = _increasing(table, times)
     if np.all(np.diff(t) > 0):
         return False
     return all(float(np.mean(np.diff(t[places == one]) > 0)) > 0.95 for one in range(int(places.max()) + 1))

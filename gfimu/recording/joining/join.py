@@ -13,7 +13,7 @@ from scipy.interpolate import CubicSpline
 from gfimu.base.declared import Declared, Table, figure
 from gfimu.base.errors import InputError
 from gfimu.base.results import Panel, PlottedResult, Series, text_column
-from gfimu.recording.importing.oddities import rails_of
+from gfimu.recording.doubts.rails import rails_of
 from gfimu.recording.importing.piece import nearest_rows
 from gfimu.recording.joining.alignment import align
 from gfimu.recording.joining.reference_file import ReferenceSeries

@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 
 import gfimu
-from gfimu.recording import without_clipped
+from gfimu.recording import doubts_of, without_doubtful
+
+
+def without_clipped(recording, array):
+    found = [one for one in doubts_of(recording, array) if one.kind == "clipped"]
+    return without_doubtful(recording, array, found), tuple(found)
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from gfimu import AccelerometerArray, Chip
 from gfimu.base import STANDARD_GRAVITY
-from gfimu.recording import Recording, check_recording
+from gfimu.recording import Recording, doubts_of
 
 ONE = AccelerometerArray("one", (Chip("a1", np.array([0.15, 0.0, 0.0]), np.eye(3), "generic"),))
 
@@ -34,14 +34,14 @@ RUNS = {
 
 @pytest.mark.parametrize("run", RUNS.values(), ids=RUNS)
 def test_a_right_file_passes(run):
-    assert check_recording(run, ONE) == ()
+    assert doubts_of(run, ONE) == ()
 
 
 @pytest.mark.parametrize("name", [name for name in RUNS if name != "a fast wheel"])
 @pytest.mark.parametrize(("unit", "factor"), [("g", 1.0), ("mg", 1000.0)])
 def test_another_unit_is_refused_by_its_name(name, unit, factor):
     run = RUNS[name]
-    (finding,) = check_recording(replace(run, readings=run.readings * factor / STANDARD_GRAVITY, unit_from=""), ONE)
+    (finding,) = doubts_of(replace(run, readings=run.readings * factor / STANDARD_GRAVITY, unit_from=""), ONE)
     assert finding.refused
     assert finding.kind == "unit"
     assert f"…_{unit}" in finding.text
@@ -49,20 +49,20 @@ def test_another_unit_is_refused_by_its_name(name, unit, factor):
 
 def test_a_fast_wheel_in_g_is_known_by_the_gravity_that_turns():
     run = RUNS["a fast wheel"]  # 3.4 g of centripetal force: as such no sign of a wrong unit
-    (finding,) = check_recording(replace(run, readings=run.readings / STANDARD_GRAVITY), ONE)
+    (finding,) = doubts_of(replace(run, readings=run.readings / STANDARD_GRAVITY), ONE)
     assert finding.refused
     assert "gravity turns in it by 0.99" in finding.text
 
 
 def test_a_file_without_gravity_is_refused():
     run = RUNS["at rest"]
-    (finding,) = check_recording(replace(run, readings=run.readings - [STANDARD_GRAVITY, 0.0, 0.0]), ONE)
+    (finding,) = doubts_of(replace(run, readings=run.readings - [STANDARD_GRAVITY, 0.0, 0.0]), ONE)
     assert finding.refused
     assert "9.81" in finding.text
 
 
 def test_a_poor_gain_is_a_warning_only():
     run = RUNS["at rest"]
-    (finding,) = check_recording(replace(run, readings=0.5 * run.readings), ONE)
+    (finding,) = doubts_of(replace(run, readings=0.5 * run.readings), ONE)
     assert not finding.refused
     assert "calibrate" in finding.text

@@ -9,7 +9,7 @@ import pytest
 
 from gfimu import AccelerometerArray
 from gfimu.base import STANDARD_GRAVITY
-from gfimu.recording import check_recording
+from gfimu.recording import doubts_of
 from sim.scenarios import Scenario
 from sim.simulation import simulate
 
@@ -28,10 +28,10 @@ def as_a_board_sends_it(scenario: str, real: str, seed: int):
 def test_the_wrong_mounting_is_refused_and_the_right_one_is_not(scenario: str, real: str) -> None:
     run = as_a_board_sends_it(scenario, real, 7)
     (wrong,) = set(ARRAYS) - {real}
-    (found,) = check_recording(run, ARRAYS[wrong])
+    (found,) = doubts_of(run, ARRAYS[wrong])
     assert (found.kind, found.refused) == ("array", True)
     assert found.text.endswith(f"give it with --array {real}")
-    assert not check_recording(run, ARRAYS[real])
+    assert not doubts_of(run, ARRAYS[real])
 
 
 @pytest.mark.parametrize("real", ARRAYS)
@@ -39,13 +39,13 @@ def test_steady_speeds_without_a_tachometer_show_it_too(real: str) -> None:
     """Each of them reads as constant as a rest; only a square of the rate that is negative shows it."""
     run = as_a_board_sends_it("speed_sweep", real, 8)
     (wrong,) = set(ARRAYS) - {real}
-    assert [found.kind for found in check_recording(run, ARRAYS[wrong])] == ["array"]
-    assert not check_recording(run, ARRAYS[real])
+    assert [found.kind for found in doubts_of(run, ARRAYS[wrong])] == ["array"]
+    assert not doubts_of(run, ARRAYS[real])
 
 
 def test_at_rest_nothing_shows() -> None:
     run = as_a_board_sends_it("rest", "cube12_as_built", 9)
-    assert not any(check_recording(run, array) for array in ARRAYS.values())
+    assert not any(doubts_of(run, array) for array in ARRAYS.values())
 
 
 @pytest.mark.parametrize(

@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation
 from gfimu import AccelerometerArray, InputError, Recording, estimate, estimate_from_rest, specific_force
 from gfimu.array import PartLimits
 from gfimu.base import STANDARD_GRAVITY, list_models
-from gfimu.recording import check_recording, open_run
-from gfimu.recording.checks import refuse_or_warn
+from gfimu.recording import doubts_of, open_run
+from gfimu.recording.doubts.judge import refuse_or_warn
 from sim.scenarios import Scenario
 from sim.simulation import simulate
 from sim.trials.benchmark.generators.independent_world import hide
@@ -161,7 +161,7 @@ def table_run():
 def test_a_short_run_of_uncalibrated_chips_is_accepted(seed):
     """One rest, then a spin: the α that biases read there adds up to many times the rate, unless it is taken off."""
     run = simulate(Scenario.load("paper_run", changes=["duration_s=10"]), seed=seed)
-    assert not check_recording(run, CUBE)
+    assert not doubts_of(run, CUBE)
 
 
 @pytest.mark.study(only=["a11 and a12", "a11 and a13", "a11 inverted"])
@@ -169,7 +169,7 @@ def test_a_short_run_of_uncalibrated_chips_is_accepted(seed):
 def test_a_wrong_file_is_refused_with_its_cause(table_run, name):
     spoil, kind, words = WRONG[name]
     wrong = spoil(table_run)
-    found = check_recording(wrong, CUBE)
+    found = doubts_of(wrong, CUBE)
     assert [(one.kind, one.refused) for one in found] == [(kind, True)]
     assert words in found[0].text
     assert "\n" not in found[0].text
@@ -200,14 +200,14 @@ def test_two_things_wrong_at_once_are_both_named(table_run, name):
     wrong = table_run
     for change in changes:
         wrong = with_columns(wrong, change)
-    found = check_recording(wrong, CUBE)
+    found = doubts_of(wrong, CUBE)
     assert [(one.kind, one.refused) for one in found] == [(kind, True)]
     assert all(word in found[0].text for word in words), found[0].text
 
 
 def test_another_array_is_named(table_run):
     built = AccelerometerArray.load("cube12_as_built")
-    found = check_recording(table_run, built)
+    found = doubts_of(table_run, built)
     assert [(one.kind, one.refused) for one in found] == [("array", True)]
     assert "--array cube12" in found[0].text
 
@@ -227,19 +227,19 @@ def test_an_array_that_nothing_can_contradict_is_no_explanation(tmp_path, change
     up = np.column_stack([0.005 * np.cos(angle), -0.005 * np.sin(angle), np.ones(len(t))])  # the table leans
     readings = specific_force(board, G * up, np.outer(np.gradient(rate, t), axis), np.outer(rate, axis))
     run = Recording.from_arrays(t, readings + 0.03 * np.random.default_rng(5).standard_normal(readings.shape), board)
-    assert check_recording(run, board) == ()
-    (found,) = check_recording(with_columns(run, change), board)
+    assert doubts_of(run, board) == ()
+    (found,) = doubts_of(with_columns(run, change), board)
     assert found.refused
     assert cause in found.text
 
 
 def test_a_rate_other_than_the_stated_one_is_refused(table_run):
     stated = replace(table_run, metadata={"sample_rate_hz": 100.0})
-    assert check_recording(stated, CUBE) == ()
-    (found,) = check_recording(replace(stated, t_s=1e3 * stated.t_s), CUBE)
+    assert doubts_of(stated, CUBE) == ()
+    (found,) = doubts_of(replace(stated, t_s=1e3 * stated.t_s), CUBE)
     assert found.refused
     assert "milliseconds" in found.text
-    (other,) = check_recording(replace(stated, metadata={"sample_rate_hz": 50.0}), CUBE)
+    (other,) = doubts_of(replace(stated, metadata={"sample_rate_hz": 50.0}), CUBE)
     assert not other.refused
     assert "50 Hz" in other.text
 
@@ -271,7 +271,7 @@ def test_perfect_sensors_are_not_taken_for_dead_ones():
     run = Recording.from_arrays(
         t, specific_force(CUBE, [[0, 0, G]] * 500, np.zeros((500, 3)), np.zeros((500, 3))), CUBE
     )
-    assert check_recording(run, CUBE) == ()
+    assert doubts_of(run, CUBE) == ()
 
 
 @pytest.mark.parametrize(
@@ -281,14 +281,14 @@ def test_perfect_sensors_are_not_taken_for_dead_ones():
 @pytest.mark.parametrize("errors", ["none", "limits", "alike"])
 def test_errors_within_the_data_sheet_are_not_refused(name, kind, errors):
     run, array = world(np.random.default_rng([MOTIONS.index(kind), len(errors)]), name, kind, errors)
-    assert not [one.text for one in check_recording(run, array) if one.refused]
+    assert not [one.text for one in doubts_of(run, array) if one.refused]
 
 
 @pytest.mark.study(only=["centrifuge", "eccentric_mount", "speed_sweep"])
 @pytest.mark.parametrize("name", list_models("scenarios"))
 def test_shipped_scenarios_are_clean(name):
     scenario = Scenario.load(name)
-    assert check_recording(simulate(scenario, seed=3), scenario.array) == ()
+    assert doubts_of(simulate(scenario, seed=3), scenario.array) == ()
 
 
 @pytest.mark.study(only=["2"])
@@ -299,15 +299,15 @@ def test_hidden_effects_are_not_refused(seed):
     readings = np.column_stack([columns[f"{name}_m_s2"] for name in CUBE.channels])
     reference = {"tacho_rad_s": columns["tacho_rad_s"]}
     run = Recording.from_arrays(columns["t_s"], readings, CUBE, reference=reference)
-    assert not [one.text for one in check_recording(run, CUBE) if one.refused]
+    assert not [one.text for one in doubts_of(run, CUBE) if one.refused]
 
 
 @pytest.mark.parametrize("name", ["exp_1", "exp_2"])
 def test_real_hand_motion_is_not_refused(shared_data, name):
     recording, array = open_run(shared_data / "mimu4444" / f"{name}.bin.gz")
-    assert not [one.text for one in check_recording(recording, array) if one.refused]
+    assert not [one.text for one in doubts_of(recording, array) if one.refused]
     one_chip = with_columns(recording, scaled([6, 7, 8], 1 / G))
-    assert [one.kind for one in check_recording(one_chip, array) if one.refused] == ["chip_unit"]
+    assert [one.kind for one in doubts_of(one_chip, array) if one.refused] == ["chip_unit"]
 
 
 def test_a_rest_bias_beyond_the_data_sheet_is_refused(table_run):
@@ -329,10 +329,10 @@ def test_two_axes_exchanged_on_every_chip_are_named_by_the_tachometer(table_run,
         table_run.t_s, [0, 3, 4, 8, 9, 13, 14.5, 16, 17, 21, 22.5, 24], [0, 0, 2, 2, 4, 4, 0, 0, -3, -3, 0, 0]
     )
     run = replace(table_run, reference={"tacho_rad_s": rate})
-    assert check_recording(run, CUBE) == ()
-    (found,) = check_recording(replace(run, readings=run.readings[:, order.ravel()]), CUBE)
+    assert doubts_of(run, CUBE) == ()
+    (found,) = doubts_of(replace(run, readings=run.readings[:, order.ravel()]), CUBE)
     assert (found.kind, found.refused) == ("exchange", True)
     assert f"axes {one + 1} and {two + 1} of every chip are exchanged" in found.text
     pair = [3 * chip + axis for chip in ({1: (1, 2), 2: (1, 3)}[two]) for axis in range(3)]
-    (found,) = check_recording(with_columns(run, exchanged(pair, pair[3:] + pair[:3])), CUBE)
+    (found,) = doubts_of(with_columns(run, exchanged(pair, pair[3:] + pair[:3])), CUBE)
     assert found.text.startswith(f"chips a2 and a{two + 2} are exchanged")

@@ -7,7 +7,7 @@ import pytest
 
 from gfimu import AccelerometerArray, InputError, Recording, estimate, simulate
 from gfimu.array import PartLimits
-from gfimu.recording import check_recording, odd_rates
+from gfimu.recording import doubts_of, odd_rates
 
 CUBE = AccelerometerArray.load("cube12")
 RPM, DEG = 30.0 / np.pi, 180.0 / np.pi
@@ -40,9 +40,9 @@ def with_reference(run, **factors):
     ],
 )
 def test_a_rate_in_another_unit_is_refused_with_the_unit(table_run, column, factor, words):
-    assert check_recording(with_reference(table_run, **{column: 1.0}), CUBE) == ()
+    assert doubts_of(with_reference(table_run, **{column: 1.0}), CUBE) == ()
     wrong = with_reference(table_run, **{column: factor})
-    (found,) = check_recording(wrong, CUBE)
+    (found,) = doubts_of(wrong, CUBE)
     assert (found.kind, found.refused) == ("reference", True)
     assert words in found.text
     assert "\n" not in found.text
@@ -52,15 +52,15 @@ def test_a_rate_in_another_unit_is_refused_with_the_unit(table_run, column, fact
 
 def test_a_gyro_in_degrees_is_refused(hand_run):
     gyro = {f"gyro_{axis}_rad_s": DEG for axis in "xyz"}
-    assert check_recording(hand_run, hand_run.array) == ()
-    (found,) = check_recording(with_reference(hand_run, **gyro), hand_run.array)
+    assert doubts_of(hand_run, hand_run.array) == ()
+    (found,) = doubts_of(with_reference(hand_run, **gyro), hand_run.array)
     assert found.refused
     assert "gyro_x_rad_s is in deg/s" in found.text
 
 
 def test_another_scale_is_a_warning(table_run):
-    assert check_recording(with_reference(table_run, tacho_rad_s=1.3), CUBE) == ()  # a gain, which a diagnosis names
-    (found,) = check_recording(with_reference(table_run, tacho_rad_s=3.0), CUBE)
+    assert doubts_of(with_reference(table_run, tacho_rad_s=1.3), CUBE) == ()  # a gain, which a diagnosis names
+    (found,) = doubts_of(with_reference(table_run, tacho_rad_s=3.0), CUBE)
     assert (found.kind, found.refused) == ("reference", False)
     assert "check its unit, the gear, and the lengths of the array file" in found.text
 
@@ -68,7 +68,7 @@ def test_another_scale_is_a_warning(table_run):
 @pytest.mark.parametrize("factor", [1.0, RPM, DEG])
 def test_a_rest_shows_no_rate(factor):
     """The noise of a tachometer at rest goes with slow changes of the biases by chance."""
-    assert check_recording(with_reference(simulate("rest", seed=2), tacho_rad_s=factor), CUBE) == ()
+    assert doubts_of(with_reference(simulate("rest", seed=2), tacho_rad_s=factor), CUBE) == ()
 
 
 def test_an_array_file_in_cm_is_no_tachometer_in_revolutions(table_run):
@@ -86,7 +86,7 @@ def test_a_rate_beyond_any_table_is_a_warning_where_one_chip_can_not_tell():
     t = np.arange(3000) / 100.0
     readings = np.array([0.0, 0.0, 9.81]) + 0.05 * np.random.default_rng(1).standard_normal((3000, 3))
     run = Recording.from_arrays(t, readings, one, reference={"tacho_rad_s": 300.0 * np.sin(t)})
-    (found,) = check_recording(run, one)
+    (found,) = doubts_of(run, one)
     assert (found.kind, found.refused) == ("reference", False)
     assert "more than a table or wheel has: it may be in rev/min or deg/s" in found.text
-    assert check_recording(with_reference(run, tacho_rad_s=0.1), one) == ()
+    assert doubts_of(with_reference(run, tacho_rad_s=0.1), one) == ()

@@ -6,7 +6,7 @@ import pytest
 import gfimu
 from gfimu import InputError
 from gfimu.base import STANDARD_GRAVITY
-from gfimu.recording import check_recording
+from gfimu.recording import doubts_of
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +42,7 @@ def test_one_chip_of_arrays_in_another_unit_is_to_be_scaled(run):
 def test_a_single_chip_of_arrays_too(run):
     array = gfimu.AccelerometerArray.load("one_adxl345")
     recording = gfimu.Recording.from_arrays(run.t_s, run.readings[:, :3] / STANDARD_GRAVITY, array)
-    (finding,) = check_recording(recording, array)
+    (finding,) = doubts_of(recording, array)
     assert finding.text.endswith('it looks like it is in g: give unit="g" to gfimu.Recording.from_arrays')
 
 

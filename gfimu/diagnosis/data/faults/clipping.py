@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from gfimu.base.difference_noise import difference_noise
 from gfimu.diagnosis.data.faults.rails import PILE, Rail, find_rails
 from gfimu.diagnosis.data.run import Run
-from gfimu.recording.importing.oddities import GARBAGE
+from gfimu.recording.policy import SamplePolicy
 
 __all__ = ["clipping_level", "own_rails"]
 
@@ -56,7 +56,7 @@ def clipping_level(
     close = np.abs(np.array(levels) - limit) < 1.5 * float(steps.min())
     beyond_it = np.abs(np.where(run.valid, run.readings, 0.0)) > limit + np.maximum(0.6 * steps, 4.0 * white)
     # One chip in another range may read more, and single samples may be garbage.
-    contradicted = np.sum(beyond_it.sum(axis=0) > GARBAGE) > _ONE_CHIP
+    contradicted = np.sum(beyond_it.sum(axis=0) > SamplePolicy.garbage) > _ONE_CHIP
     return limit if close.sum() >= max(1, len(levels) // 2) and not contradicted else None
 
 
@@ -73,7 +73,7 @@ def own_rails(
         return rails
     other = any(abs(abs(rail.level) - limit) > 1.5 * steps[rail.channel] for rail in rails)
     beyond = np.abs(np.where(run.valid, run.readings, 0.0)) > limit + np.maximum(0.6 * steps, 4.0 * white)
-    return rails if other or (beyond.sum(axis=0) > GARBAGE).any() else []
+    return rails if other or (beyond.sum(axis=0) > SamplePolicy.garbage).any() else []
 
 
 def _cut_off(lacking: Sequence[tuple[float, float]], step: float) -> list[float]:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.diagnosis.data.run import Run
-from gfimu.recording.importing.oddities import BEYOND_PILE, GARBAGE, RAIL_WIDTH
+from gfimu.recording.policy import SamplePolicy
 
 __all__ = ["PILE", "Rail", "find_rails", "on_rails", "rail_parameters", "rail_sentence"]
 
@@ -97,7 +97,7 @@ def _pinned(
             level, margin = rail.sign * rail.level, max(1.5 * steps[channel], 3.0 * rail.scatter)
             at = np.abs(mine - level) < margin
             clear = beyond > level + _CLEAR * white[channel] + steps[channel]
-            if len(mine) >= PILE and at.mean() > 1.0 - BEYOND_PILE and clear.mean() > _ON_IT:
+            if len(mine) >= PILE and at.mean() > 1.0 - SamplePolicy.beyond_pile and clear.mean() > _ON_IT:
                 found.append(Rail(channel, rail.sign, rail.level, rail.scatter))
                 break
     return found
@@ -108,10 +108,10 @@ def _pile(
 ) -> tuple[float, float] | None:
     """Return the level of a pile of equal readings at the top of a channel, and its scatter."""
     below_top = np.rint((mine.max() - mine) / step).astype(int)  # counts
-    counts = np.bincount(below_top[below_top < 2 * RAIL_WIDTH], minlength=2 * RAIL_WIDTH)
-    place = int(np.argmax(counts[: RAIL_WIDTH + 1]))
+    counts = np.bincount(below_top[below_top < 2 * SamplePolicy.rail_width], minlength=2 * SamplePolicy.rail_width)
+    place = int(np.argmax(counts[: SamplePolicy.rail_width + 1]))
     pile, above, under = int(counts[place]), int(counts[:place].sum()), int(counts[place + 1 : place + 4].max())
-    if pile < PILE or above > BEYOND_PILE * pile or pile <= _STEEP * under + 4:
+    if pile < PILE or above > SamplePolicy.beyond_pile * pile or pile <= _STEEP * under + 4:
         return None
     level = float(mine[below_top == place].mean())
     on = below_top <= place
@@ -164,7 +164,7 @@ def _flat(
     mine: NDArray[np.float64], expected: NDArray[np.float64], step: float, sigma: float
 ) -> tuple[tuple[float, float], NDArray[np.bool_]] | None:
     """Return the level at which readings stay while their prediction moves beyond, their scatter, and these rows."""
-    top = float(np.partition(mine, -GARBAGE - 1)[-GARBAGE - 1])
+    top = float(np.partition(mine, -SamplePolicy.garbage - 1)[-SamplePolicy.garbage - 1])
     clear = _CLEAR * (sigma + step)
     beyond = expected > top + clear
     if beyond.sum() < PILE:
@@ -175,7 +175,7 @@ def _flat(
     under = expected < level - clear
     if (
         scatter > _SCATTER * max(sigma, step)
-        or top - level > RAIL_WIDTH * step + _SCATTER * sigma
+        or top - level > SamplePolicy.rail_width * step + _SCATTER * sigma
         or within.mean() < _ON_IT
         or under.sum() < PILE
         or np.ptp(expected[beyond]) < _SCATTER * max(scatter, sigma, step)
@@ -210,7 +210,7 @@ def on_rails(
         on[:, rail.channel] |= rail.sign * run.readings[:, rail.channel] >= level - margin
         on[:, rail.channel] |= rail.sign * prediction[:, rail.channel] > level - _CLEAR * noise[rail.channel]
     # Of a channel that hardly leaves its rail only the noise would be left.
-    return np.asarray(on | (on.mean(axis=0) > 1.0 - BEYOND_PILE))
+    return np.asarray(on | (on.mean(axis=0) > 1.0 - SamplePolicy.beyond_pile))
 
 
 def rail_parameters(
@@ -224,8 +224,8 @@ def rail_parameters(
     sides = {1: "upper", -1: "lower"}
     each = {f"{channels[rail.channel]}_{sides[rail.sign]}_m_s2": rail.level for rail in rails}
     alike = all(abs(abs(rail.level) - limit) < 1.5 * steps[rail.channel] for rail in rails)
-    beyond = np.abs(np.where(run.valid, run.readings, 0.0)) > limit + RAIL_WIDTH * steps
-    return {"limit_m_s2": limit, **({} if alike and beyond.sum(axis=0).max() <= GARBAGE else each)}
+    beyond = np.abs(np.where(run.valid, run.readings, 0.0)) > limit + SamplePolicy.rail_width * steps
+    return {"limit_m_s2": limit, **({} if alike and beyond.sum(axis=0).max() <= SamplePolicy.garbage else each)}
 
 
 def rail_sentence(rails: Sequence[Rail], channels: Sequence[str], left_out: int) -> str:

@@ -7,11 +7,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.recording.importing.column_map import REFERENCE_KINDS, UNMAPPED
-from gfimu.recording.importing.guessing.parts import known_reference
+from gfimu.recording.importing.guessing.parts import known_reference, varies
 from gfimu.recording.importing.guessing.triads import is_rate
 from gfimu.recording.importing.notation import factor_of, kind_of, unit_of_name
 from gfimu.recording.quantities import GYRO_COLUMNS, REFERENCE_UNITS, TIME_COLUMNS, reference_quantity
@@ -85,7 +84,7 @@ def likely_references(columns: Mapping[str, NDArray[Any]], reference: str = "") 
     names = [
         name
         for name, values in columns.items()
-        if name not in _NO_REFERENCE and not name.startswith(_TRUTH) and _varies(values)
+        if name not in _NO_REFERENCE and not name.startswith(_TRUTH) and varies(values)
     ]
     found = [
         LikelyReference(name, known[0], known[1], _has_unit(name))
@@ -115,13 +114,6 @@ def reference_remedy(columns: Mapping[str, NDArray[Any]], reference: str) -> str
         The reference that it lacks, SI.
     """
     return ", or ".join(one.remedy for one in likely_references(columns, reference)[:_MOST])
-
-
-def _varies(values: NDArray[Any]) -> bool:
-    if values.dtype.kind not in "iuf":
-        return False
-    known = values[np.isfinite(values)]
-    return bool(len(known)) and bool((known != known[0]).any())
 
 
 def _has_unit(name: str) -> bool:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import re
 from collections.abc import Collection
 from dataclasses import dataclass
+from typing import Any
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.recording.importing.column_map import REFERENCE_KINDS, ColumnSpec
+from gfimu.recording.importing.guessing.names import words_of
 from gfimu.recording.importing.guessing.times import find_time
 from gfimu.recording.importing.guessing.triads import Triad, find_triads, is_acceleration
 from gfimu.recording.importing.guessing.units import TriadUnit, triad_values, unit_of_rate
@@ -28,15 +30,19 @@ __all__ = [
     "other_references",
     "reason",
     "single_axes",
+    "varies",
 ]
 
 LEAST_ROWS = 0.2  # of the longest table: a table of another chip has as many samples
 GYRO = ("gyro_x_rad_s", "gyro_y_rad_s", "gyro_z_rad_s")
 _AXIS = re.compile(r"(?<![b-z])[xyz](?![a-z])")
-_TACHO = ("tacho", "rpm", "omega", "speed")
-_ANGLE = ("angle", "theta", "encoder")
-_TEMPERATURE = ("temperature", "temp_", "degc", "imu_temp")
-_OTHER_QUANTITY = re.compile(r"gps|ground|wind|km/?h|mph|knots|[ _]?[xyz]$|steer")
+_TACHO = re.compile(r"tacho|\brpm|omega|speed|ang\w* ?(vel|rate)|rotation(al)? (vel|rate)|\bspin\b|turntable")
+_ANGLE = re.compile(r"angle|theta|\bphi\b|encoder|rotation$|\bwinkel|angular pos|ang pos")
+_TEMPERATURE = re.compile(r"temp(erature)?\b|\bdegc|imu temp")
+_OTHER_QUANTITY = re.compile(
+    r"gps|cov\w*|\bstd|alpha$|beta$|gamma$|ground|wind|km ?h\b|mph|knots|steer|stamp"
+    r"|\b(\w*(gyr|rate|omega)\w*|w)?[xyz]$"
+)
 
 
 def reason(why: str, sure: bool) -> str:
@@ -63,7 +69,8 @@ def chip_part(number: int, chosen: RawTable, table: RawTable, triad: Triad, unit
     }
     roles = {name: f"{key}, {_scaled(unit)}" for key, name in zip(columns, triad.columns, strict=True)}
     where = f" of {elsewhere}" if elsewhere else ""
-    why = reason(f"chip a{number} ({', '.join(triad.columns)}{where}): {unit.why}", unit.sure)
+    doubt = "; by its name a program has computed it from others" if triad.is_processed else ""
+    why = reason(f"chip a{number} ({', '.join(triad.columns)}{where}): {unit.why}{doubt}", unit.sure and not doubt)
     return Part(columns, {} if elsewhere else roles, (why,), (f"a{number}1",) if unit.sure else ())
 
 
@@ -104,11 +111,13 @@ def gyro_part(
         found = [(other, one) for other in raw.tables.values() if other is not chosen for one in _rates(other, chosen)]
     if not found:
         return Part({}, {}, ())
-    table, triad = found[0]
-    values = triad_values(table, triad.columns)
-    unit = unit_of_rate(
-        values, triad.columns[0], force if force is not None and len(force) == len(values) else None, rate_hz
-    )
+    tried = []
+    for table, triad in found:
+        values = triad_values(table, triad.columns)
+        alike = force if force is not None and len(force) == len(values) else None
+        tried.append((table, triad, unit_of_rate(values, triad.columns[0], alike, rate_hz)))
+    # Without names that show a rate, the one is the gyro by which gravity turns.
+    table, triad, unit = max(tried, key=lambda one: (one[1].by_name, one[2].is_gravity))
     elsewhere = "" if table is chosen else table.name
     columns = {
         key: msgspec.structs.replace(_spec(name, unit, 0), table=elsewhere)
@@ -135,7 +144,7 @@ def other_references(table: RawTable, taken: Collection[str]) -> Part:
     reasons = []
     for name in table.columns:
         known = known_reference(name)
-        if known is None or name in taken or known[0] in found or table.columns[name].dtype == object:
+        if known is None or name in taken or known[0] in found or not varies(table.columns[name]):
             continue
         key, unit = known
         found[key] = ColumnSpec(name, unit)
@@ -145,21 +154,27 @@ def other_references(table: RawTable, taken: Collection[str]) -> Part:
     return Part(found, roles, tuple(reasons))
 
 
+def varies(values: NDArray[Any]) -> bool:
+    """Whether a column holds numbers that are not all the same."""
+    if values.dtype.kind not in "iuf":
+        return False
+    known = values[np.isfinite(values)]
+    return bool(len(known)) and bool((known != known[0]).any())
+
+
 def known_reference(name: str) -> tuple[str, str] | None:
     """Return the reference that a column is by its name, and its unit or the usual one; None if it is none."""
-    plain, unit = unit_of_name(name.lower())
-    if _OTHER_QUANTITY.search(plain) or (not unit and re.search(r"[\[(].*[\])]\s*$", plain)):
+    words, (plain, unit) = words_of(name), unit_of_name(name.lower())
+    if _OTHER_QUANTITY.search(words) or (not unit and re.search(r"[\[(].*[\])]\s*$", plain)):
         return None
-    words = {"tacho_rad_s": _TACHO, "angle_rad": _ANGLE, "temperature_degC": _TEMPERATURE}
-    for key, marks in words.items():
-        if any(mark in name.lower() for mark in marks) or (key == "temperature_degC" and plain == "temp"):
-            if unit:
-                return (key, unit) if kind_of(unit) == REFERENCE_KINDS[key] else None
-            if key == "temperature_degC":
-                return key, "degC"
+    for key, mark in (("temperature_degC", _TEMPERATURE), ("angle_rad", _ANGLE), ("tacho_rad_s", _TACHO)):
+        sure = unit == "rpm" or key == "temperature_degC"
+        if kind_of(unit) == REFERENCE_KINDS[key] and (mark.search(words) or sure):
+            return key, unit
+        if not unit and mark.search(words):
             degrees = "deg" in plain
-            usual = "rpm" if "rpm" in plain else "deg/s" if degrees else "rad/s"
-            return key, usual if key == "tacho_rad_s" else "deg" if degrees else "rad"
+            rate = "rpm" if "rpm" in plain else "deg/s" if degrees else "rad/s"
+            return key, {"temperature_degC": "degC", "tacho_rad_s": rate, "angle_rad": "deg" if degrees else "rad"}[key]
     return None
 
 

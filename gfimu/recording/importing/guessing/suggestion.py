@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.base.errors import InputError
+from gfimu.recording.doubts.samples import sentinels_of
 from gfimu.recording.importing.clock import times_of
 from gfimu.recording.importing.column_map import REFERENCE_KINDS, ColumnMap, TextSpec, TimeSpec, load_map
 from gfimu.recording.importing.guessing.parts import (
@@ -27,7 +28,6 @@ from gfimu.recording.importing.guessing.times import RATES, TimeGuess, find_time
 from gfimu.recording.importing.guessing.triads import Triad, find_triads
 from gfimu.recording.importing.guessing.units import unit_of_acceleration
 from gfimu.recording.importing.notation import factor_of
-from gfimu.recording.importing.oddities import sentinels_of
 from gfimu.recording.importing.raw_table import RawFile, RawTable
 from gfimu.recording.importing.splitting import find_split, split_file
 
@@ -87,12 +87,17 @@ def suggest(raw: RawFile, *, table: str = "", name: str = "map") -> Suggestion:
     reasons: list[str] = []
     chosen = raw.table(table) if table else _most_promising(raw)
     time = find_time(chosen)
-    split_by = find_split(chosen, time.columns[0] if time.columns else None)
-    if split_by is not None:
-        raw = split_file(RawFile(raw.source, raw.format, {chosen.name: chosen}), split_by, raw.source)
+    split = find_split(chosen, time.columns[0] if time.columns else None)
+    if split is not None:
+        raw = split_file(RawFile(raw.source, raw.format, {chosen.name: chosen}), split.column, raw.source)
         chosen = _most_promising(raw)
         time = find_time(chosen)
-        reasons.append(f"{split_by} names the chip of each row: {', '.join(raw.tables)}")
+        listed = ", ".join(raw.tables)
+        reasons.append(
+            reason(f"{split.column} names parts of the recording: {listed}; table = {chosen.name!r} is taken", False)
+            if split.is_part
+            else f"{split.column} names the chip of each row: {listed}"
+        )
     missing = _missing(raw)
     if missing:
         raw = _without(raw, missing)
@@ -111,6 +116,7 @@ def suggest(raw: RawFile, *, table: str = "", name: str = "map") -> Suggestion:
     chips = [
         found
         for other in raw.tables.values()
+        if other is chosen or split is None or not split.is_part
         for found in (own if other is chosen else _alike(other, chosen, own) if own else [])
     ]
     units = [unit_of_acceleration(one, triad.columns) for one, triad in chips]
@@ -150,7 +156,7 @@ def suggest(raw: RawFile, *, table: str = "", name: str = "map") -> Suggestion:
             text=TextSpec() if chosen.named else TextSpec(columns=tuple(chosen.columns)),
             table=chosen.name if len(raw.tables) > 1 else "",
             format="" if raw.format in _UNNAMED else raw.format,
-            split_by=split_by or "",
+            split_by=split.column if split is not None else "",
             skip_rows=skipped,
             missing=missing,
         )

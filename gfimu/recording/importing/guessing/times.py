@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.recording.doubts.stamps import steady_clock
 from gfimu.recording.importing.clock import parts_of
 from gfimu.recording.importing.column_map import TimeSpec
 from gfimu.recording.importing.dates import nanoseconds_of
@@ -32,10 +33,17 @@ _LOOKED_AT = 50  # texts
 _MOST_PARTS = 8  # restarts of a logger: what goes back more often is no time
 _ROUND_RATE = 2e-3  # relative, by which a rate found from rounded times is taken for a whole number
 _SAID_RATE = re.compile(
-    r"(?:sampl\w*|output|update|data|logging|acq\w*)[ _-]*(?:rate|freq\w*)|\bodr\b|\bfs\b|frequency", re.IGNORECASE
+    r"(?<!baud )(?<!bit )(?<!heart )(?:sampl\w*|output|update|data|logging|acq\w*)?[ _-]*(?:\brate|rate\b|freq\w*)"
+    r"|\bodr\b|\bfs\b",
+    re.IGNORECASE,
+)
+_SAID_PERIOD = re.compile(
+    r"(?:interval|period|delta[ _]?[xt]|\bdt)(?P<unit>_[mun]?s)?\b[^\d\n]{0,12}?(?P<number>\d*\.?\d+(?:e-?\d+)?)"
+    r"\s*(?P<after>[mun]?s(?:ec\w*)?\b)?",
+    re.IGNORECASE,
 )
 _NUMBER = re.compile(r"(?<![\w.])(\d+(?:[.,]\d+)?)\s*(k?hz)?", re.IGNORECASE)
-_HERTZ = re.compile(r"(\d+(?:[.,]\d+)?)\s*(k?)hz", re.IGNORECASE)
+_HERTZ = re.compile(r"(\d+(?:[.,]\d+)?)\s*(k?)(?:hz|sps)\b", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -91,6 +99,11 @@ def stated_rate(table: RawTable) -> tuple[float, str] | None:
             rate = float(number[1].replace(",", ".")) * (1e3 if (number[2] or "").lower() == "khz" else 1.0)
             if RATES[0] <= rate <= RATES[1]:
                 return rate, line[said.start() : number.end()].strip()
+        for period in _SAID_PERIOD.finditer(line):
+            unit = (period["unit"] or period["after"] or "s").strip("_").lower()
+            seconds = float(period["number"]) * {"m": 1e-3, "u": 1e-6, "n": 1e-9}.get(unit[0], 1.0)
+            if seconds and RATES[0] <= 1.0 / seconds <= RATES[1]:
+                return float(f"{1.0 / seconds:.12g}"), period[0].strip()
         for hertz in _HERTZ.finditer(line):
             rate = float(hertz[1].replace(",", ".")) * (1e3 if hertz[2] else 1.0)
             rates.setdefault(rate, hertz[0])
@@ -149,7 +162,7 @@ def _of_numbers(table: RawTable, name: str, values: NDArray[Any]) -> tuple[float
     plain, unit = unit_of_name(name)
     has_unit = bool(unit) and kind_of(unit) == "time"
     word = any(mark in plain.lower() for mark in _WORDS) or plain.lower() in {"t", "ts", "ms", "us"} or has_unit
-    counter = None if word and not _COUNTERS.search(plain) else _counter(table, name, steps)
+    counter = None if word and not _COUNTERS.search(plain) else _counter(table, name, values, steps)
     if counter is not None:
         return counter
     within = _within_seconds(name, known, steps)
@@ -165,21 +178,29 @@ def _of_numbers(table: RawTable, name: str, values: NDArray[Any]) -> tuple[float
     wrap = _wrap(steps, usual)
     part = None if wrap is not None else _part(np.asarray(values, dtype=float))
     scatter = _scatter(steps, usual)
-    if has_unit:
-        rate = 1.0 / (usual * factor_of(unit, "time"))
-        why = f"the name of {name} has its unit; {rate:.4g} Hz"
-        return 6.0 - scatter, TimeGuess(TimeSpec(name, unit, wrap=wrap, part=part), why)
-    order = [unit for unit, marks in _HINTS.items() if any(plain.lower().endswith(mark) for mark in marks)]
-    order += ["d"] if _DAYS[0] < float(known[0]) < _DAYS[1] and usual < 1e-5 else []
-    for candidate in [*order, *(one for one in ("s", "ms", "us", "ns") if one not in order)]:
-        rate = 1.0 / (usual * TIME[candidate])
-        if RATES[0] <= rate <= RATES[1]:
-            sure = word or scatter < 0.5
-            why = f"{name} increases by {usual:.6g} per row, which in {candidate} is {rate:.4g} Hz"
-            return (4.0 if word else 1.0) - scatter, TimeGuess(
-                TimeSpec(name, candidate, wrap=wrap, part=part), why, sure
-            )
+    units = [unit] if has_unit else _units_to_try(plain, float(known[0]), usual)
+    for candidate in units:
+        factor = factor_of(candidate, "time") if has_unit else TIME[candidate]
+        steady = None if wrap is not None or part is not None else steady_clock(known.astype(float) * factor)
+        rate = 1.0 / (usual * factor) if steady is None else steady.rate_hz
+        if not has_unit and not RATES[0] <= rate <= RATES[1]:
+            continue
+        if steady is not None:
+            why = f"{name}: its times {steady.sentence}"
+            return 4.0 if word else 1.0, TimeGuess(TimeSpec(rate_hz=rate), why, False, columns=(name,))
+        spec = TimeSpec(name, candidate, wrap=wrap, part=part)
+        if has_unit:
+            return 6.0 - scatter, TimeGuess(spec, f"the name of {name} has its unit; {rate:.4g} Hz")
+        why = f"{name} increases by {usual:.6g} per row, which in {candidate} is {rate:.4g} Hz"
+        return (4.0 if word else 1.0) - scatter, TimeGuess(spec, why, word or scatter < 0.5)
     return None
+
+
+def _units_to_try(plain: str, first: float, usual: float) -> list[str]:
+    """Return units of a column of times without one, the most likely first: by the end of its name, by its size."""
+    order = [unit for unit, marks in _HINTS.items() if any(plain.lower().endswith(mark) for mark in marks)]
+    order += ["d"] if _DAYS[0] < first < _DAYS[1] and usual < 1e-5 else []
+    return [*order, *(one for one in ("s", "ms", "us", "ns") if one not in order)]
 
 
 def _scatter(steps: NDArray[np.float64], usual: float) -> float:
@@ -187,25 +208,30 @@ def _scatter(steps: NDArray[np.float64], usual: float) -> float:
     return min(0.5, float(np.median(np.abs(steps - usual))) / usual)
 
 
-def _counter(table: RawTable, name: str, steps: NDArray[np.float64]) -> tuple[float, TimeGuess] | None:
+def _counter(
+    table: RawTable, name: str, values: NDArray[Any], steps: NDArray[np.float64]
+) -> tuple[float, TimeGuess] | None:
     """Return how a column that counts samples gives the time."""
     back = steps[steps < 0]
     wrap = float(1.0 - back.min()) if len(back) else None
+    if wrap is not None and (wrap < 4.0 or math.log2(wrap) % 1.0 or len(back) > 0.3 * len(steps)):
+        wrap = None  # it starts anew where the recording does
     ones = float(np.mean(np.isin(steps, [1.0] if wrap is None else [1.0, 1.0 - wrap])))
-    if ones < 0.9 or (wrap is not None and (wrap < 4.0 or math.log2(wrap) % 1.0 or len(back) > 0.3 * len(steps))):
+    if ones < 0.9:
         return None
+    part = _part(np.asarray(values, dtype=float)) if wrap is None else None
     rate = stated_rate(table)
     if rate is None and not _COUNTERS.search(unit_of_name(name)[0]):
         return None
     if rate is None:
-        spec = TimeSpec(name, rate_hz=_UNKNOWN_RATE_HZ, wrap=wrap)
+        spec = TimeSpec(name, rate_hz=_UNKNOWN_RATE_HZ, wrap=wrap, part=part)
         why = (
             f"{name} counts samples, and the file states no rate: rate_hz = {_UNKNOWN_RATE_HZ:g} only holds the place, "
             "give the true one"
         )
         return 0.5, TimeGuess(spec, why, False, False)
     why = f"{name} counts samples; the file states {rate[1]!r}"
-    return 0.9, TimeGuess(TimeSpec(name, rate_hz=rate[0], wrap=wrap), why)
+    return 0.9, TimeGuess(TimeSpec(name, rate_hz=rate[0], wrap=wrap, part=part), why)
 
 
 def _rounded(name: str, values: NDArray[Any], factor: float | None) -> tuple[float, TimeGuess] | None:

@@ -1,31 +1,48 @@
-"""Triads of an unknown table: columns that belong together as x, y and z, of acceleration or of rate."""
+"""Triads of an unknown table: columns that belong together as x, y and z, of acceleration or of rate.
+
+Which columns belong together follows from their names (x, y, z; numbers) or, without names, from their order. What
+they measure is scored: unit and words of the name, the name of the table, and the numbers, by gravity at rest.
+"""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.recording.importing.guessing.units import rest_windows, sphere_of, triad_values, unit_of_acceleration
+from gfimu.recording.importing.guessing.names import (
+    ABSOLUTE,
+    ACCELERATION,
+    OTHER,
+    PROCESSED,
+    RATE,
+    WEAK_ACCELERATION,
+    WEAK_RATE,
+    words_of,
+)
+from gfimu.recording.importing.guessing.units import (
+    TriadUnit,
+    rest_windows,
+    sphere_of,
+    triad_values,
+    unit_of_acceleration,
+)
 from gfimu.recording.importing.notation import kind_of, unit_of_name
 from gfimu.recording.importing.raw_table import RawTable
+from gfimu.recording.policy import GuessPolicy
 
 __all__ = ["Triad", "find_triads", "is_acceleration", "is_rate"]
 
-_STRONG = re.compile(r"acc|force|adxl|mma\d|lis\d|bma\d|kx\d|kxrb", re.IGNORECASE)
-_WEAK = re.compile(r"^a[xyz_\d\[ ]|_a_|^a_", re.IGNORECASE)
-_SINGLE = re.compile(r"a_?\d|a[_ ]?[xyz](?![a-z])", re.IGNORECASE)
-_GYRO = re.compile(r"gyr|omega|angular|^w[xyz_\d\[ ]|^w_|rate|rot|itg", re.IGNORECASE)
-_FREE = re.compile(r"free|lin\w* ?acc|without ?g|user ?acc", re.IGNORECASE)
 _NUMBERED = re.compile(r"(?P<before>.*?)(?P<number>\d+)(?P<after>\D*)")
-_NEITHER = re.compile(
-    r"mag(?!nitude)|^m_?[xyz]$|euler|quat|orient|^field[ _]?[xyz]|_field|angle|roll|pitch|yaw|pos|vel_|std|cov|temp|gps"
-    r"|^q_?[0-3wxyz]$|mat\[|rotm|dcm|setpoint|motor|axis[pidf]|command|gravity|uncal",
-    re.IGNORECASE,
-)
+_AXES = (("x", "y", "z"), ("0", "1", "2"), ("1", "2", "3"))
+_ROUND = 0.1  # relative: by which the length at rest scatters where it is the same in all poses
+_NEAR_ZERO = 0.02  # of the largest reading
+_STEADY = 1e-3  # of the length: less than any accelerometer that is moved varies
+_POLICY = GuessPolicy()
 
 
 @dataclass(frozen=True)
@@ -38,43 +55,71 @@ class Triad:
         Names along x, y and z.
     kind : str
         ``acceleration``, ``rate``, or empty.
+    by_name : bool
+        Whether the names, and not the numbers alone, show the kind.
+    shows_gravity : bool
+        Whether the length at rest is gravity.
+    is_usual : bool
+        Whether it is gravity in a usual unit or a usual number of counts.
+    is_processed : bool
+        Whether the names are those of an acceleration that a program has computed from others.
+    why_not : str
+        What in the numbers contradicts the names; empty if nothing does.
     """
 
     columns: tuple[str, str, str]
     kind: str
+    by_name: bool = False
+    shows_gravity: bool = False
+    is_usual: bool = False
+    is_processed: bool = False
+    why_not: str = ""
 
 
 def find_triads(table: RawTable, taken: Sequence[str] = ()) -> list[Triad]:
     """Return columns whose names differ in x, y, z (or 0, 1, 2 or 1, 2, 3) alone, or are numbered on, of force or rate.
 
-    Where the numbers of one triad are gravity at rest, others count as acceleration only if their names say so.
+    Where the numbers of one triad are gravity at rest, others count as acceleration only if their names are those of
+    one; an acceleration that a program has computed counts only where nothing else shows gravity.
     """
     free = {_short(name): name for name in table.columns if name not in taken and table.columns[name].dtype != object}
     if not table.named:
-        return _by_gravity(
-            table, [(one, False) for run in _runs(table, free.values()) for one in _without_names(table, run)]
-        )
-    numbered = _numbered(table, free)
-    found: list[tuple[Triad, bool]] = [(Triad(one, "acceleration"), True) for one in numbered]
-    used: set[str] = {_short(name) for one in numbered for name in one}
+        return _chosen([one for run in _runs(table, free.values()) for one in _without_names(table, run)], named=False)
+    found = _numbered(table, free)
+    used = {_short(name) for one in found for name in one.columns}
     for short, name in free.items():
-        for axes in (("x", "y", "z"), ("0", "1", "2"), ("1", "2", "3")):
-            for place in (spot for spot, letter in enumerate(short) if letter == axes[0]):
-                three = [short[:place] + axis + short[place + 1 :] for axis in axes]
-                if all(one in free for one in three) and not used & set(three):
-                    columns = (name, free[three[1]], free[three[2]])
-                    # More than three with numbers are axes of one each, unless gravity is their length.
-                    fourth = short[:place] + str(int(axes[2]) + 1) + short[place + 1 :] if axes[2] != "z" else ""
-                    if fourth in free and not _is_gravity(table, columns):
-                        continue
-                    used |= set(three)
-                    kind, by_name = _kind(table, columns)
-                    found.append((Triad(columns, kind), by_name))
-    return _by_gravity(table, found)
+        for three in _threes_of(short):
+            if all(one in free for one in three) and not used & set(three):
+                columns = (name, free[three[1]], free[three[2]])
+                triad = _triad(table, columns)
+                # More than three with numbers are axes of one each, unless gravity is their length.
+                if _goes_on(three, free) and not triad.shows_gravity:
+                    continue
+                used |= set(three)
+                found.append(triad)
+    return _chosen(found, named=True)
 
 
-def _numbered(table: RawTable, free: Mapping[str, str]) -> list[tuple[str, str, str]]:
-    """Return threes of columns whose names are numbered on over several chips, as CH0 … CH11, if all show gravity.
+def _threes_of(short: str) -> list[tuple[str, str, str]]:
+    """Return the names of three axes of which a name is the first; the last letter or number first, ``a11`` as a12."""
+    found = []
+    for first, second, third in _AXES:
+        places = [place for place, letter in enumerate(short) if letter == first]
+        found += [
+            (short, *(short[:place] + axis + short[place + 1 :] for axis in (second, third))) for place in places[::-1]
+        ]
+    return [(one, two, three) for one, two, three in found]
+
+
+def _goes_on(three: tuple[str, str, str], free: Mapping[str, str]) -> bool:
+    """Whether a fourth name follows three numbered ones."""
+    place = next(spot for spot, (one, two) in enumerate(zip(three[0], three[1], strict=True)) if one != two)
+    last = three[2][place]
+    return last.isdigit() and three[2][:place] + str(int(last) + 1) + three[2][place + 1 :] in free
+
+
+def _numbered(table: RawTable, free: Mapping[str, str]) -> list[Triad]:
+    """Return the threes that show gravity in columns whose names are numbered on, as CH0 … CH11, as without names.
 
     Parameters
     ----------
@@ -86,16 +131,19 @@ def _numbered(table: RawTable, free: Mapping[str, str]) -> list[tuple[str, str, 
     series: dict[tuple[str, str], dict[int, str]] = {}
     for short, name in free.items():
         found = _NUMBERED.fullmatch(short)
-        if found and not _NEITHER.search(short):
+        if found and not OTHER.search(words_of(name)):
             series.setdefault((found["before"], found["after"]), {})[int(found["number"])] = name
-    threes: list[tuple[str, str, str]] = []
+    threes: list[Triad] = []
     for columns in series.values():
         order = sorted(columns)
-        if len(order) < 6 or len(order) % 3 or order != list(range(order[0], order[0] + len(order))):
+        is_usual = len(order) == len(_AXES[0]) and order[0] in {0, 1}
+        if is_usual or len(order) % 3 or any(two - one != 1 for one, two in pairwise(order)):
             continue
-        groups = [(columns[at], columns[at + 1], columns[at + 2]) for at in order[::3]]
-        if all(_is_gravity(table, group) for group in groups):
-            threes += groups
+        found_here = _threes(table, [columns[number] for number in order])
+        if any(one.shows_gravity for one in found_here) and all(
+            one.shows_gravity or one.kind == "rate" for one in found_here
+        ):
+            threes += found_here
     return threes
 
 
@@ -113,7 +161,7 @@ def _without_names(table: RawTable, names: Sequence[str]) -> list[Triad]:
     """
     ways = [_threes(table, names[:first]) + _threes(table, names[first:]) for first in range(3)]
     ways.append(_one_by_one(table, names))
-    gravity = [sum(one.kind == "acceleration" and _is_gravity(table, one.columns) for one in way) for way in ways]
+    gravity = [sum(one.shows_gravity for one in way) for way in ways]
     return ways[gravity.index(max(gravity))]
 
 
@@ -134,10 +182,9 @@ def _one_by_one(table: RawTable, names: Sequence[str]) -> list[Triad]:
     apart: list[str] = []
     place = 0
     while place < len(names):
-        three = tuple(names[place : place + 3])
-        if len(three) == 3 and _is_gravity(table, (three[0], three[1], three[2])):
-            found += _threes(table, apart)
-            found.append(Triad((three[0], three[1], three[2]), "acceleration"))
+        three = _threes(table, names[place : place + 3])
+        if three and three[0].shows_gravity:
+            found += [*_threes(table, apart), *three]
             apart = []
             place += 3
         else:
@@ -146,81 +193,113 @@ def _one_by_one(table: RawTable, names: Sequence[str]) -> list[Triad]:
     return found + _threes(table, apart)
 
 
-def _is_gravity(table: RawTable, columns: tuple[str, str, str]) -> bool:
-    return _kind_by_numbers(table, columns) == "acceleration" and unit_of_acceleration(table, columns).is_gravity
-
-
 def _threes(table: RawTable, names: Sequence[str]) -> list[Triad]:
-    groups = [(names[first], names[first + 1], names[first + 2]) for first in range(0, len(names) - 2, 3)]
-    return [Triad(group, _kind_by_numbers(table, group)) for group in groups]
+    return [_triad(table, (names[at], names[at + 1], names[at + 2])) for at in range(0, len(names) - 2, 3)]
 
 
-def _by_gravity(table: RawTable, triads: Sequence[tuple[Triad, bool]]) -> list[Triad]:
+def _chosen(triads: list[Triad], *, named: bool) -> list[Triad]:
     """Return triads; where one shows gravity, others that neither show it nor are named so are no acceleration."""
-    gravity = [one.kind == "acceleration" and unit_of_acceleration(table, one.columns).is_gravity for one, _ in triads]
-    if not any(one.kind == "acceleration" for one, _ in triads):
+    if not any(one.kind == "acceleration" for one in triads):
         # A wheel that never rests shows no gravity; without names something has to be the acceleration.
-        return [replace(one, kind="acceleration") if one.kind and not by_name else one for one, by_name in triads]
-    if not any(gravity):
-        return [one for one, _ in triads]
-    return [
-        replace(one, kind="rate") if one.kind == "acceleration" and not fits and not by_name else one
-        for (one, by_name), fits in zip(triads, gravity, strict=True)
-    ]
+        return triads if named else [replace(one, kind="acceleration") if one.kind else one for one in triads]
+    showing = [one for one in triads if one.kind == "acceleration" and one.shows_gravity]
+    if not showing:
+        return [replace(one, kind="") if one.is_processed or (named and not one.by_name) else one for one in triads]
+    raw = any(not one.is_processed for one in showing)
+    usual = any(one.is_usual for one in showing)
+    found = []
+    for one in triads:
+        if one.is_processed and one.kind == "acceleration" and (raw or not one.shows_gravity):
+            found.append(replace(one, kind=""))
+        elif one in showing and usual and not one.is_usual and not one.by_name:
+            found.append(replace(one, kind=""))  # of constant length without being gravity: a magnetic field
+        elif one.kind == "acceleration" and not one.shows_gravity and not one.by_name:
+            found.append(replace(one, kind="rate"))
+        else:
+            found.append(one)
+    return found
 
 
 def is_acceleration(name: str) -> bool:
-    """Whether a column is an acceleration by its unit or its name."""
-    plain, unit = unit_of_name(name)
-    if _NEITHER.search(plain) or _GYRO.search(plain):
+    """Whether a column is an acceleration along one axis by its unit or its name."""
+    words, unit = words_of(name), unit_of_name(name)[1]
+    if OTHER.search(words) or RATE.search(words) or PROCESSED.search(words) or ABSOLUTE.search(words):
         return False
-    return kind_of(unit) == "acceleration" if unit else bool(_STRONG.search(plain) or _SINGLE.match(plain))
+    if unit:
+        return kind_of(unit) == "acceleration"
+    return bool(ACCELERATION.search(words) or WEAK_ACCELERATION.match(words))
 
 
 def is_rate(name: str) -> bool:
     """Whether a column is an angular rate by its unit or its name."""
-    plain, unit = unit_of_name(name)
-    if _NEITHER.search(plain):
+    words, unit = words_of(name), unit_of_name(name)[1]
+    if OTHER.search(words) and not RATE.search(words):
         return False
-    return kind_of(unit) == "rate" if unit else bool(_GYRO.search(plain))
+    return kind_of(unit) == "rate" if unit else bool(RATE.search(words) or WEAK_RATE.match(words))
 
 
 def _short(name: str) -> str:
     return unit_of_name(name)[0].lower()
 
 
-def _kind(table: RawTable, columns: tuple[str, str, str]) -> tuple[str, bool]:
-    """Return what three columns measure, and whether their names say so: by unit, by name, or by their numbers."""
-    plain, unit = unit_of_name(columns[0])
-    kind = kind_of(unit) if unit else ""
-    if unit and kind not in {"acceleration", "rate"}:
-        return "", True
-    for name in (plain, table.name):
-        if _NEITHER.search(name):
-            return "", True
-        if (kind == "acceleration" or not kind) and _FREE.search(name):
-            # ROS has gravity in its linear acceleration, phones have not.
-            return ("acceleration" if unit_of_acceleration(table, columns).is_gravity else ""), True
-        if kind:
-            return kind, True
-        if _GYRO.search(name):
-            return "rate", True
-        if _STRONG.search(name):
-            return "acceleration", True
-    if _WEAK.search(plain):
-        return "acceleration", False
-    return _kind_by_numbers(table, columns), False
+def _triad(table: RawTable, columns: tuple[str, str, str]) -> Triad:
+    """Return three columns with what they measure by all evidence: unit, words, the table's name, and the numbers."""
+    words = words_of(columns[0]) if table.named else ""
+    named, is_processed = _evidence_of_names(words, words_of(table.name), unit_of_name(columns[0])[1])
+    numbers, unit = _evidence_of_numbers(table, columns)
+    kinds = ("", "acceleration", "rate")  # of equal ones the first
+    kind = max(kinds, key=lambda one: named.get(one, 0.0) + numbers.get(one, 0.0))
+    by_name = max(kinds, key=lambda one: named.get(one, 0.0))
+    why_not = f"its name is that of {by_name or 'something else'}" if kind != by_name and named else ""
+    is_sure = named.get(kind, 0.0) > _POLICY.letter
+    gravity = unit is not None and unit.is_gravity and kind == "acceleration"
+    is_usual = gravity and unit is not None and not any(unit.offset)
+    return Triad(columns, kind, is_sure, gravity, is_usual, is_processed, why_not)
 
 
-def _kind_by_numbers(table: RawTable, columns: Sequence[str]) -> str:
-    """Return acceleration where the length of the vector at rest is the same in all poses, else rate near zero."""
+def _evidence_of_names(words: str, table: str, unit: str) -> tuple[dict[str, float], bool]:
+    """Return log odds of what a column measures by its name and that of its table, and whether it was computed."""
+    found: dict[str, float] = {}
+
+    def add(kind: str, odds: float) -> None:
+        found[kind] = found.get(kind, 0.0) + odds
+
+    if unit:
+        kind = kind_of(unit)
+        add(kind if kind in {"acceleration", "rate"} else "", _POLICY.unit)
+    for text, odds in ((words, _POLICY.word), (table, _POLICY.table)):
+        if text and RATE.search(text) and not re.search(r"uncal|temp|\bstd|\bcov", text):
+            add("rate", odds)
+        elif text and OTHER.search(text):
+            add("", _POLICY.unit)
+        elif text and ACCELERATION.search(text):
+            add("acceleration", odds)
+        else:
+            continue
+        break
+    if not found and WEAK_ACCELERATION.search(words):
+        add("acceleration", _POLICY.letter)
+    if not found and WEAK_RATE.search(words):
+        add("rate", _POLICY.letter)
+    return found, bool(PROCESSED.search(words) or (not words and PROCESSED.search(table)))
+
+
+def _evidence_of_numbers(table: RawTable, columns: tuple[str, str, str]) -> tuple[dict[str, float], TriadUnit | None]:
+    """Return log odds of what three columns measure by their length at rest, and its unit as an acceleration."""
     values = triad_values(table, columns)
     windows = rest_windows(values)
-    if not len(windows) or not values[np.isfinite(values)].any():
-        return ""
+    unit = unit_of_name(columns[0])[1]
+    if not len(windows) or not values[np.isfinite(values)].any() or (unit and kind_of(unit) != "acceleration"):
+        return {}, None
     lengths = np.linalg.norm(windows, axis=1)
-    spread = float(np.std(lengths) / max(np.median(lengths), 1e-12))
-    largest = float(np.nanmax(np.abs(values)))
-    if spread < 0.1 and np.median(lengths) > 0.02 * largest:
-        return "acceleration"
-    return "acceleration" if sphere_of(windows) is not None else "rate"
+    usual = float(np.median(lengths))
+    is_constant = float(np.std(lengths)) < _ROUND * usual and usual > _NEAR_ZERO * float(np.nanmax(np.abs(values)))
+    is_sphere = sphere_of(windows) is not None
+    if not is_constant and not is_sphere:
+        return {"rate": _POLICY.zero}, None
+    guess = unit_of_acceleration(table, columns)
+    is_gravity = guess.is_gravity
+    if not (is_gravity and not any(guess.offset)) and float(np.nanmax(np.nanstd(values, axis=0))) < _STEADY * usual:
+        return {}, None  # what hardly varies, as a place on the Earth
+    odds = _POLICY.constant + (_POLICY.gravity if is_gravity else 0.0) + (_POLICY.poses if is_sphere else 0.0)
+    return {"acceleration": odds}, guess

@@ -16,6 +16,7 @@ from gfimu.recording.importing.raw_table import RawTable
 __all__ = ["NEAR", "TriadUnit", "rest_windows", "sphere_of", "triad_values", "unit_of_acceleration", "unit_of_rate"]
 
 _GRAVITY = {"m/s^2": 1.0, "g": STANDARD_GRAVITY, "mg": STANDARD_GRAVITY / 1e3, "mm/s^2": 1e-3, "cm/s^2": 1e-2}
+_RARE = {"mm/s^2", "cm/s^2"}  # units that hardly any logger writes
 NEAR = 0.08  # relative, of gravity at rest: gains of parts lie within
 _WINDOWS = 400  # pieces into which a triad is divided to look for rest
 _BEST, _AS_QUIET = 5, 3.0  # pieces that show how quiet rest is, and how many times that still counts as rest
@@ -54,7 +55,8 @@ class TriadUnit:
     sure : bool
         Whether the data leave no other reading.
     is_gravity : bool
-        Whether gravity at rest is that of a usual unit, a usual number of counts, or of a sphere of poses.
+        Whether gravity at rest is that of a usual unit, a usual number of counts, or of a sphere of poses; of rates,
+        whether gravity turns by them.
     """
 
     unit: str
@@ -134,7 +136,8 @@ def _usual_unit(values: NDArray[np.float64], length: float) -> TriadUnit | None:
     if whole:
         readings["1024 counts per g"] = 1024.0
     off = {name: abs(length / one - 1.0) for name, one in readings.items()}
-    near = sorted((name for name, distance in off.items() if distance < NEAR), key=lambda name: off[name])
+    near = [name for name, distance in off.items() if distance < NEAR]
+    near.sort(key=lambda name: (name in _RARE, off[name]))
     if not near:
         return None
     best, *others = near
@@ -193,26 +196,23 @@ def unit_of_rate(
     if turn is not None:
         (unit, scale), words = min(_SCALES.items(), key=lambda one: abs(_log_ratio(one[0], turn)))
         ratio = math.exp(_log_ratio((unit, scale), turn))
-        if abs(ratio - 1.0) < _NEAR_SCALE:
-            others = [
-                word
-                for key, word in _SCALES.items()
-                if word != words and abs(_log_ratio(key, turn) - _log_ratio((unit, scale), turn)) < 0.03
-            ]
-            why = f"gravity turns as these rates do in {words} (ratio {ratio:.3f})"
-            why += f"; {' or '.join(others)} is as likely" if others else ""
-            return TriadUnit(unit, scale, zero, why, not others)
-        why = f"one step is {turn:.4g} rad/s by the turn of gravity, which is no usual scale"
-        return TriadUnit("rad/s", float(f"{turn:.4g}"), zero, why, False)
+        others = [
+            word
+            for key, word in _SCALES.items()
+            if word != words and abs(_log_ratio(key, turn) - _log_ratio((unit, scale), turn)) < 0.03
+        ]
+        why = f"gravity turns as these rates do in {words} (ratio {ratio:.3f})"
+        why += f"; {' or '.join(others)} is as likely" if others else ""
+        return TriadUnit(unit, scale, zero, why, not others and abs(ratio - 1.0) < _NEAR_SCALE)
     largest = float(np.nanmax(np.abs(rates)))
     if largest > 2500.0:
         why = f"up to {largest:.4g}: counts; 16.4 per °/s (±2000 °/s) is a guess, the data sheet has the scale"
-        return TriadUnit("deg/s", 1.0 / 16.4, zero, why, False)
+        return TriadUnit("deg/s", 1.0 / 16.4, zero, why, False, False)
     if largest > _FASTEST_RAD_S:
         whole = bool(np.all(rates[np.isfinite(rates)] == np.round(rates[np.isfinite(rates)])))
         why = f"up to {largest:.4g}: too fast for rad/s" + ("; deg/s, or counts" if whole else "")
-        return TriadUnit("deg/s", 1.0, zero, why, not whole)
-    return TriadUnit("rad/s", 1.0, zero, f"up to {largest:.4g}: rad/s, or slow motion in deg/s", False)
+        return TriadUnit("deg/s", 1.0, zero, why, not whole, False)
+    return TriadUnit("rad/s", 1.0, zero, f"up to {largest:.4g}: rad/s, or slow motion in deg/s", False, False)
 
 
 def _log_ratio(scale: tuple[str, float], turn: float) -> float:
