@@ -155,7 +155,7 @@ def test_rails_corrupt_values_and_noise_are_reported():
     values["c"] += 300.0 * rng.standard_normal(8000)
     values["d"][:] = 7.0
     reported = [one.text for one in sample_doubts(values, [[name] for name in values])]
-    assert any(line.startswith("a reads its rail")  and "most 5600" in line for line in reported)
+    assert any(line.startswith("a reads its rail") and "most 5600" in line for line in reported)
     assert not any("rail" in line and line[0] in "bcd" for line in reported)
     assert any(line.startswith("b: 1 values that can be no reading") for line in reported)
     assert any(line.startswith("b: 3 of 8000 cells are empty") for line in reported)
