@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -57,8 +58,7 @@ def fitting_maps(raw: RawFile, *, fully: bool = False) -> list[str]:
     ``fully``: only maps that make both the rate and gravity right.
     """
     found = []
-    for name in list_maps():
-        column_map = load_map(name)
+    for name, column_map in _shipped_maps().items():
         if column_map.format and column_map.format != raw.format:
             continue
         tables = [one for key, one in raw.tables.items() if not column_map.table or key == column_map.table]
@@ -70,6 +70,12 @@ def fitting_maps(raw: RawFile, *, fully: bool = False) -> list[str]:
     if fully and best < _FULLY:
         return []
     return [name for plausible, _, name in sorted(found, key=lambda one: (-one[1], one[2])) if plausible == best]
+
+
+@cache
+def _shipped_maps() -> dict[str, ColumnMap]:
+    """Return the shipped maps by name, which every file of unknown origin is compared with."""
+    return {name: load_map(name) for name in list_maps()}
 
 
 def _score(table: RawTable, column_map: ColumnMap) -> int:

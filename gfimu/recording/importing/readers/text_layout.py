@@ -102,9 +102,9 @@ def layout_of(
             numbered = tuple(f"column_{place}" for place in range(1, width + 1))
             # Names may end before the cells do, as where a separator closes each line.
             known = tuple(names) + numbered[len(names) :] if names else header or numbered
-            share = _share_read([cells for _, cells in data if len(cells) == width], point)
+            unread = _unread([cells for _, cells in data if len(cells) == width], point)
             # Spaces part dates from times and words of names too: another mark goes before them where it reads as much.
-            score = (lines_so, share, width if mark != " " else 1)
+            score = (lines_so, -unread, width if mark != " " else 1)
             # A point is the usual decimal mark: a comma has to read more lines, or more cells of them.
             if best is None or score > best[0]:
                 best = score, Layout(mark, point, first, known, bool(names) or header is not None)
@@ -182,12 +182,12 @@ def _data_lines(lines: Sequence[str], separator: str, decimal: str, skip: int) -
     return found
 
 
-def _share_read(lines: Sequence[Sequence[str]], decimal: str) -> float:
-    """Return which share of the filled cells are numbers, dates or times of day, to a hundredth."""
+def _unread(lines: Sequence[Sequence[str]], decimal: str) -> float:
+    """Return how many cells of a line are no number, date or time of day, to a hundredth."""
     filled = [cell for cells in lines for cell in cells if cell]
     short = [cell for cell in filled if len(cell) <= _POLICY.longest_cell]
     read = sum(_NUMBER[decimal].fullmatch(cell) is not None or _STAMP.fullmatch(cell) is not None for cell in short)
-    return round(read / max(len(filled), 1), 2)
+    return round((len(filled) - read) / max(len(lines), 1), 2)
 
 
 def _header(before: Sequence[str], separator: str, width: int, row_name: str) -> tuple[str, ...] | None:

@@ -12,11 +12,10 @@ __all__ = ["plain_lines"]
 _LOOKED_AT = 400  # lines
 _DATE = r"(?:\d{4}-\d\d-\d\d[T _])?"
 _HOST_TIME = re.compile(
-    rf"^\s*\[?({_DATE}\d{{1,2}}:\d\d:\d\d[.,:]\d+)\]?(?:\s*(?:->|>|\]|\|)\s*|\s+(?=[^\s,;]+\s*[,;\t]))"
+    rf"^\s*\[?({_DATE}\d{{1,2}}:\d\d:\d\d[.,:]\d+)\]?(?:\s*(?:->|>|\]|\|)\s*| +(?=[+-]?[\d.]+ *[,;\t]))"
 )
-_LABELLED = re.compile(
-    r"([A-Za-z_][\w .\[\]()/°²^-]{0,60}?)\s*[:=]\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?![\d:])"
-)
+_REAL = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
+_LABELLED = re.compile(rf"((?<![A-Za-z_])[A-Za-z_][\w .\[\]()/°²^-]{{0,60}}?)\s*[:=]\s*({_REAL})(?![\d:])")
 _BRACKETED = re.compile(r"^\s*[\[({][^A-Za-z\"]*[\])}]\s*,?\s*$")
 _CHECKED = re.compile(r"\*[0-9A-Fa-f]{2}\s*$")
 _STAMP = re.compile(rf"{_DATE}\d{{1,2}}:\d\d:\d\d(?:[.,:]\d+)?")
@@ -26,9 +25,8 @@ _COLOURS = re.compile(r"\x1b\[[\d;]*m")
 _TICK = re.compile(r"^\s*[IWEDV] \((\d+)\)")
 _UNIT = re.compile(r"\s*([A-Za-zµ°²%/^\d]{0,8})\s*$")
 _PREFIXED = re.compile(
-    r"^(.{0,200}(?:(?<!\w)([A-Za-z]\w*)|[\])])\s*(?::|->|-|>|\|)\s*)(X(?:[\s,;]+X)+)[\s,;]*$".replace(
-        "X", r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
-    )
+    r"^(?=.{0,1000}$)(.{0,200}(?:(?<!\w)([A-Za-z]\w*)|[\])])\s*(?::|->|-|>|\|)\s*)"
+    rf"({_REAL}(?:[\s,;]+{_REAL})+)[\s,;]*$"
 )
 _SECONDS = re.compile(r"\[\s*(\d+\.\d+)\]")
 _HOST = "host_time"

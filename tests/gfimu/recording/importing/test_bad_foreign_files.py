@@ -82,6 +82,12 @@ ENDLESS = {
     "a name of spaces": b"t,x" + b" " * 60_000 + b"x,y\n" + b"0.1,1,2\n" * 9,
     "an open bracket": b"t,x [" + b" " * 60_000 + b"x,y\n" + b"0.1,1,2\n" * 9,
     "lines that begin with spaces": (b" " * 9_000 + b"1 2 3\n") * 400,
+    "a log with a number of many digits": (b"[INFO] imu: 1 " + b"1" * 9_000 + b"x\n") * 400,
+    "a log of many marks": (b"a: " * 60 + b"1 " * 50 + b"x\n") * 400,
+    "a word of many letters": (b"a" * 9_000 + b": 1 2 3x\n") * 400,
+    "values to plot": (b">a:" + b"1" * 9_000 + b":x\n") * 400,
+    "series of many words": (b"a," + b"1," * 9_000 + b"x\n") * 60,
+    "a LabVIEW file of ends": b"LabVIEW Measurement\n" + b"***End_of_Header***\n" * 90_000,
     "dates above words": b"t,ax\n" + b"2024-05-17T23:59:50.000Z,1\n" * 60 + b"x,2\n" * 100,
 }
 
@@ -149,7 +155,7 @@ def test_rails_corrupt_values_and_noise_are_reported():
     values["c"] += 300.0 * rng.standard_normal(8000)
     values["d"][:] = 7.0
     reported = [one.text for one in sample_doubts(values, [[name] for name in values])]
-    assert any(line.startswith("a reads its rail")  and "most 5600" in line for line in reported)
+    assert any(line.startswith("a reads its rail") and "most 5600" in line for line in reported)
     assert not any("rail" in line and line[0] in "bcd" for line in reported)
     assert any(line.startswith("b: 1 values that can be no reading") for line in reported)
     assert any(line.startswith("b: 3 of 8000 cells are empty") for line in reported)

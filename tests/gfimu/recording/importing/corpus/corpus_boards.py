@@ -1,7 +1,7 @@
 """Shapes of evaluation boards, sketches and serial logs."""
 
 import numpy as np
-from corpus_motion import G, Right, counts, motion, ms, rows, shape, stamps
+from corpus_motion import G, Right, counts, motion, ms, rows, shape, stamps, warming
 
 ST = "https://www.st.com (Unico, Unicleo-GUI, HSDatalog)"
 ADAFRUIT = "https://github.com/adafruit/Adafruit_MPU6050"
@@ -40,18 +40,18 @@ def arduino_monitor_times(d):
 def adafruit_mpu6050(d):
     m = motion()
     made = []
-    for f, w in zip(m.force, m.gyro, strict=True):
+    for f, w, k in zip(m.force, m.gyro, warming(m, 26.53), strict=True):
         made += [
             "Acceleration X: {:.2f}, Y: {:.2f}, Z: {:.2f} m/s^2".format(*f),
             "Rotation X: {:.2f}, Y: {:.2f}, Z: {:.2f} rad/s".format(*w),
         ]
-        made += ["Temperature: 26.53 degC", ""]
+        made += [f"Temperature: {k:.2f} degC", ""]
     return Right(
         lines(d / "serial.txt", ["Adafruit MPU6050 test!", "MPU6050 Found!"], made),
         (m.force,),
         None,
         m.gyro,
-        {"temperature_degC": 0 * m.t + 26.53},
+        {"temperature_degC": warming(m, 26.53)},
         doubt=True,
     )
 
@@ -96,11 +96,11 @@ def openlog_artemis(d):
         *(1000 * m.g).T,
         *m.deg.T,
         *m.field.T,
-        0 * m.t + 24,
+        warming(m, 24),
         0 * m.t + 99.8,
     ]
     path = rows(d / "dataLog00001.TXT", head, columns, end=",", form="{:.2f}")
-    return Right(path, (m.force,), 100.0, m.gyro, {"temperature_degC": 0 * m.t + 24}, doubt=True)
+    return Right(path, (m.force,), 100.0, m.gyro, {"temperature_degC": warming(m, 24)}, doubt=True)
 
 
 @shape("https://microbit.org (data log)")
@@ -200,10 +200,18 @@ def two_sensors_in_turn(d):
 def sense_hat(d):
     m = motion(10.0, 60.0)
     names = "temp,pres,hum,pitch,roll,yaw,mag_x,mag_y,mag_z,acc_x,acc_y,acc_z,gyro_x,gyro_y,gyro_z,datetime"
-    columns = [0 * m.t + 27.3, 0 * m.t + 1013.2, 0 * m.t + 41.0, *(18 + 9 * m.gravity.T), *m.field.T, *m.g.T, *m.gyro.T]
+    columns = [
+        warming(m, 27.3),
+        0 * m.t + 1013.2,
+        0 * m.t + 41.0,
+        *(18 + 9 * m.gravity.T),
+        *m.field.T,
+        *m.g.T,
+        *m.gyro.T,
+    ]
     columns += [stamps(m.t, "{date} {time}.{us}")]
     return Right(
-        rows(d / "sense.csv", [names], columns), (m.force,), 10.0, m.gyro, {"temperature_degC": 0 * m.t + 27.3}
+        rows(d / "sense.csv", [names], columns), (m.force,), 10.0, m.gyro, {"temperature_degC": warming(m, 27.3)}
     )
 
 

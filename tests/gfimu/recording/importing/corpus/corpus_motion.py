@@ -202,3 +202,8 @@ def ns(t: np.ndarray) -> np.ndarray:
 def ms(t: np.ndarray, start: float = 5123.0) -> np.ndarray:
     """Return times as whole milliseconds of a board."""
     return np.round(start + 1000 * t).astype(int)
+
+
+def warming(m: Motion, start: float) -> np.ndarray:
+    """Return a temperature that rises by half a degree, °C."""
+    return np.round(start + 0.5 * (1.0 - np.exp(-3.0 * m.t / m.t[-1])), 2)

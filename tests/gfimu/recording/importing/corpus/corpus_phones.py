@@ -177,14 +177,3 @@ def bangle_accellog(d):
 def advio_accelerometer(d):
     m = motion()
     return Right(rows(d / "accelerometer.csv", [], [m.t + 0.1, *m.force.T]), (m.force,), 100.0)
-
-
-@shape("own: a MATLAB struct per sensor")
-def matlab_struct_per_sensor(d):
-    from scipy.io import savemat
-
-    m = motion()
-    acceleration = {"timestamp": m.t[:, None], **{a: m.force[:, [k]] for k, a in enumerate("XYZ")}}
-    angular = {"timestamp": m.t[:, None], **{a: m.gyro[:, [k]] for k, a in enumerate("XYZ")}}
-    savemat(d / "sensorlog.mat", {"Acceleration": acceleration, "AngularVelocity": angular})
-    return Right(d / "sensorlog.mat", (m.force,), 100.0, m.gyro)

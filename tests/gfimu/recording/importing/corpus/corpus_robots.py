@@ -1,7 +1,7 @@
 """Shapes of flight controllers, robots, printers and visual-inertial data sets."""
 
 import numpy as np
-from corpus_motion import Right, counts, motion, ms, ns, rows, shape
+from corpus_motion import Right, counts, motion, ms, ns, rows, shape, warming
 
 ROS = "https://wiki.ros.org/rostopic"
 EUROC = "https://projects.asl.ethz.ch/datasets/doku.php?id=kmavvisualinertialdatasets"
@@ -148,9 +148,9 @@ def px4_sensor_accel(d):
     names += "clip_counter[0],clip_counter[1],clip_counter[2],samples"
     stamp = np.round(31_412_345 + 1e6 * m.t).astype(int)
     still = [np.full(len(m.t), k) for k in (2_490_378, 0, 0, 0, 0, 1)]
-    columns = [stamp, stamp - 312, still[0], *m.force.T, 0 * m.t + 44.125, *still[1:]]
+    columns = [stamp, stamp - 312, still[0], *m.force.T, warming(m, 44.125), *still[1:]]
     path = rows(d / "log_sensor_accel_0.csv", [names], columns)
-    return Right(path, (m.force,), 200.0, references={"temperature_degC": 0 * m.t + 44.125})
+    return Right(path, (m.force,), 200.0, references={"temperature_degC": warming(m, 44.125)})
 
 
 @shape(ROS + " (rostopic echo -p)")

@@ -1,7 +1,7 @@
 """Shapes of body-worn sensors and of data sets recorded with them."""
 
 import numpy as np
-from corpus_motion import G, Right, counts, motion, ms, rows, shape, stamps
+from corpus_motion import G, Right, counts, motion, ms, rows, shape, stamps, warming
 
 XSENS = "https://www.movella.com/products/wearables (MT Manager, DOT exports)"
 
@@ -84,9 +84,17 @@ def witmotion(d):
     m = motion()
     names = ["Time", "DeviceName", "AccX(g)", "AccY(g)", "AccZ(g)", "AsX(°/s)", "AsY(°/s)", "AsZ(°/s)"]
     names += ["AngleX(°)", "AngleY(°)", "AngleZ(°)", "HX(uT)", "HY(uT)", "HZ(uT)", "Temperature(°C)"]
-    columns = [stamps(m.t), ["WT901BLE68"] * len(m.t), *m.g.T, *m.deg.T, *(9 * m.gravity.T), *m.field.T, 0 * m.t + 31.2]
+    columns = [
+        stamps(m.t),
+        ["WT901BLE68"] * len(m.t),
+        *m.g.T,
+        *m.deg.T,
+        *(9 * m.gravity.T),
+        *m.field.T,
+        warming(m, 31.2),
+    ]
     path = rows(d / "wit.txt", ["\t".join(names)], columns, "\t", "{:.4f}")
-    return Right(path, (m.force,), 100.0, m.gyro, {"temperature_degC": 0 * m.t + 31.2})
+    return Right(path, (m.force,), 100.0, m.gyro, {"temperature_degC": warming(m, 31.2)})
 
 
 @shape("https://github.com/digitalinteraction/openmovement (OMGUI, resampled CSV)")
@@ -133,8 +141,8 @@ def actigraph_imu(d):
             "Gyroscope X,Gyroscope Y,Gyroscope Z,Magnetometer X,Magnetometer Y,Magnetometer Z"
         ),
     ]
-    columns = [stamps(m.t, "{date}T{time}.{us}0"), *m.g.T, 0 * m.t + 29.5, *m.deg.T, *m.field.T]
-    return Right(rows(d / "imu.csv", head, columns), (m.force,), 100.0, m.gyro, {"temperature_degC": 0 * m.t + 29.5})
+    columns = [stamps(m.t, "{date}T{time}.{us}0"), *m.g.T, warming(m, 29.5), *m.deg.T, *m.field.T]
+    return Right(rows(d / "imu.csv", head, columns), (m.force,), 100.0, m.gyro, {"temperature_degC": warming(m, 29.5)})
 
 
 @shape("https://github.com/wadpac/GGIR (GENEActiv CSV)")
