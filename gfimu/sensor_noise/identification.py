@@ -2,8 +2,8 @@
 
 The DCT-II turns a record into numbers c_k, k = 1 … n − 1, that are independent: exactly for white noise and a random
 walk, because the cosines are the eigenvectors of their inverse covariance; to a few percent for flicker and
-quantisation. The variance of c_k is rate · S(k rate/2n), S the sum of the terms' spectral densities (IEEE Std 952, annex
-C). Its mean is that of the deterministic terms, a ramp R t and an exponential settling S exp(−t/τ). The c_k are pooled
+quantisation. The variance of c_k is rate · S(k rate/2n), S the sum of the spectral densities of the terms (IEEE Std
+952, annex C). Its mean is that of the deterministic terms, a ramp R t and an exponential settling S exp(−t/τ). The c_k are pooled
 in bands of half an octave, and the likelihood is maximised over all terms at once (P. Whittle, "Estimation and
 information in stationary time series", Ark. Mat. 2, 1953; restricted likelihood where the ramp and the settling are
 nuisance parameters). Frequencies that a filter or a tone shapes are left out: the terms are fitted up to the highest
@@ -51,6 +51,7 @@ TERMS = {
 """Terms by symbol: name, and unit of the coefficient after that of the readings. R and S are deterministic."""
 
 _RANDOM, _DRIFTS = 4, ("R", "S")  # terms with a spectrum come first; the others are deterministic
+_SLOW = ("B", "K", *_DRIFTS)
 _NORMAL_95 = 1.96  # numerical: half the 95 % interval of a normal number
 
 
@@ -65,8 +66,8 @@ class _Policy:
     bands_per_octave: int = 2
     single: int = 4  # lowest coefficients, each a band of its own
     fewest_bands: int = 12  # below the highest frequency that is used
-    settling: tuple[float, ...] = tuple(0.5 * 2.0 ** (-k / 2.0) for k in range(9))  # time constants, of the record
-    smooth: float = 1e3  # mean square of the misfit at which a series is a motion and no noise
+    settling: tuple[float, ...] = tuple(0.5 * 2.0 ** (-k / 3.0) for k in range(13))  # time constants, of the record
+    smooth: float = 50.0  # mean square of the misfit at which a series without white noise is a motion
     iterations: int = 100  # numerical
 
 
@@ -228,18 +229,20 @@ def identify_noise(values: ArrayLike, rate: float, *, unit: str = "m_s2") -> Noi
     allan = allan_deviation(series, rate)
     if not allan.deviation[0] > 0.0:
         raise InputError("the readings never change: a stuck channel, or noise below the resolution")
-    spectrum = _agreeing(series, rate, present)
-    if spectrum.misfit > _POLICY.smooth:
+    whole = _agreeing(series, rate, present)
+    if whole.misfit > _POLICY.smooth and not whole.maximum(TERMS, True)[1][1] > 0.0:
         raise InputError(
             "the readings vary too smoothly for noise: the unit moves, or they were filtered; give a recording at rest"
         )
+    quantised = whole.drop("Q") > _chance("Q", _POLICY.entry)
+    spectrum = whole if quantised else replace(whole, terms=("N", *_SLOW))
     groups = spectrum.seen_groups()
     sizes = spectrum.simplest(groups)
     terms = {}
     for symbol, (_, power) in TERMS.items():
         together = {one for group in groups if symbol in group for one in group}
         found, size = together == {symbol}, sizes.get(symbol, 0.0)
-        low, high = spectrum.interval(symbol)
+        low, high = (spectrum if symbol in spectrum.terms else whole).interval(symbol)
         low, high = min(low, size) if found else 0.0, max(high, size)
         std = (high - low) / (2.0 * _NORMAL_95) if found else math.nan
         rivals = tuple(one for one in TERMS if one in together - {symbol})
@@ -271,6 +274,8 @@ class _Spectrum:
         Mean square of the residuals; above what chance explains, the likelihood is divided by it.
     scale : float
         That divisor.
+    terms : tuple of str
+        Terms that are free: Q only where it was seen, as it is confounded with N.
     """
 
     count: Floats
@@ -281,6 +286,7 @@ class _Spectrum:
     settling_s: float
     misfit: float = 1.0
     scale: float = 1.0
+    terms: tuple[str, ...] = tuple(TERMS)
 
     def power(self, drifts: Floats) -> Floats:
         """Energies without R and S of the given coefficients, (b,)."""
@@ -347,12 +353,12 @@ class _Spectrum:
     @cached_property
     def _free(self) -> tuple[tuple[float, Floats], tuple[float, Floats]]:
         """Maxima with every term free: of the likelihood, and of the restricted one."""
-        return self.maximum(TERMS, False), self.maximum(TERMS, True)
+        return self.maximum(self.terms, False), self.maximum(self.terms, True)
 
     def drop(self, absent: Collection[str], **fixed: float) -> float:
         """Twice the drop of the logarithm of the likelihood where terms are absent or fixed."""
         restricted = not {"R", "S"} & {*absent, *fixed}  # comparable where the same R and S are integrated over
-        lower, _ = self.maximum(set(TERMS) - {*absent, *fixed}, restricted, **fixed)
+        lower, _ = self.maximum(set(self.terms) - {*absent, *fixed}, restricted, **fixed)
         return max(2.0 * (self._free[restricted][0] - lower) / self.scale, 0.0)
 
     def seen_groups(self) -> list[frozenset[str]]:
@@ -362,13 +368,13 @@ class _Spectrum:
         one test.
         """
         seen: set[frozenset[str]] = set()
-        for family in ("Q", "BKRS"):
-            for size in range(len(family), 0, -1):
-                for group in map(frozenset, combinations(family, size)):
-                    larger = [group | {other} for other in family if other not in group]
-                    if seen.issuperset(larger) and self.drop(group) > _chance(group, _POLICY.entry):
-                        seen.add(group)
-        return [frozenset("N"), *(group for group in seen if not any(smaller < group for smaller in seen))]
+        for size in range(len(_SLOW), 0, -1):
+            for group in map(frozenset, combinations(_SLOW, size)):
+                larger = [group | {other} for other in _SLOW if other not in group]
+                if seen.issuperset(larger) and self.drop(group) > _chance(group, _POLICY.entry):
+                    seen.add(group)
+        smallest = [group for group in seen if not any(smaller < group for smaller in seen)]
+        return [frozenset(symbol) for symbol in self.terms if symbol not in _SLOW] + smallest
 
     def simplest(self, groups: Sequence[frozenset[str]]) -> dict[str, float]:
         """Fit the fewest terms that hold one of every group, the likeliest of them; return sizes by symbol."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
 import numpy as np
@@ -19,6 +19,7 @@ from gfimu.recording.quantities import TIME_COLUMNS
 from gfimu.recording.rest import detect_rest
 from gfimu.recording.timing.reference_times import reference_series
 from gfimu.sensor_noise.identification import TERMS, NoiseModel, identify_noise
+from gfimu.sensor_noise.missing import without_isolated
 
 __all__ = ["STRETCHES", "RecordingNoise", "recording_noise"]
 
@@ -157,7 +158,7 @@ def recording_noise(
     Parameters
     ----------
     recording : Recording
-        Recording with a long rest.
+        Recording with a long rest. Isolated wrong reads are left out.
     stretch : {"rest", "all"}
         Use the longest rest (default), or all samples up to the first gap.
     rest_threshold : float, optional
@@ -168,7 +169,7 @@ def recording_noise(
     Raises
     ------
     InputError
-        If there is no rest, or a channel has missing samples or does not vary.
+        If there is no rest, or a channel lacks more than a few samples or does not vary.
 
     Examples
     --------
@@ -177,6 +178,7 @@ def recording_noise(
     'm_s2'
     """
     check_name("stretch", stretch, STRETCHES)
+    recording = replace(recording, readings=np.apply_along_axis(without_isolated, 0, recording.readings))
     if stretch == "all":
         gaps = recording.gaps
         start, stop = 0, int(gaps[0]) + 1 if len(gaps) else len(recording)
@@ -196,8 +198,6 @@ def recording_noise(
         series |= {name: _gyro_series(part, f"{name}_rad_s") for name in names}
     models = {}
     for name, (values, own_rate) in series.items():
-        if not np.isfinite(values).all():
-            raise InputError(f"channel {name} has missing samples in the stretch used; choose another run")
         try:
             unit = "rad_s" if name.startswith("gyro") else recording.unit
             models[name] = identify_noise(values, own_rate, unit=unit)
