@@ -27,7 +27,8 @@ _MOVED_SHARE = 5e-4
 _MOVED_SIGMA = 8.0
 _COMMON_SCALE = 0.01
 _NAMED_GROUPS = 6  # of poses that repeat each other, in a warning
-_UNLIKE_SHARE = 0.05  # of gravity: beyond the noise of any sample at rest
+_UNLIKE_SHARE = 0.05  # of gravity: scatter beyond the noise of any sample at rest
+_TURNED_SHARE, _TURNED_RATIO = 0.02, 3.0  # of gravity, beyond coarse counts; of the scatter across it
 
 
 def check_gravity(gravity: float) -> tuple[str, ...]:
@@ -89,12 +90,11 @@ def check_readings(recording: Recording, rest: Rest) -> tuple[str, ...]:
 def moved_poses(recording: Recording, rest: Rest) -> list[int]:
     """Find the poses (from 0) whose first and last third differ by more than noise and 0.05 % of the full range.
 
-    Such a pose turned or crept while it was recorded; one whose samples scatter by more than 5 % of gravity holds rows
-    that are unlike, such as several poses.
+    Such a pose turned or crept while it was recorded. So did one whose samples scatter far more along one direction
+    than along another, or by a good part of gravity: several poses do, and noise doesn't.
     """
     parts = [recording.readings[a:b] for a, b in zip(rest.start, rest.stop, strict=True)]
-    most = _gravity_share(recording)
-    unlike = [index for index, part in enumerate(parts) if np.nanmax(np.nanstd(part, axis=0)) > most]
+    unlike = [index for index, part in enumerate(parts) if _is_unlike(part[:, :3], recording)]
     if len(parts) < 2 or len(unlike) == len(parts):
         return unlike
     scale = float(np.max(np.ptp([np.nanmean(part, axis=0) for part in parts], axis=0)))
@@ -110,11 +110,15 @@ def moved_poses(recording: Recording, rest: Rest) -> list[int]:
     return sorted(moved)
 
 
-def _gravity_share(recording: Recording) -> float:
-    """Scatter of the samples of a pose that is no rest, reading unit; counts by the length of the first triad."""
-    if recording.unit == "m_s2":
-        return _UNLIKE_SHARE * STANDARD_GRAVITY
-    return _UNLIKE_SHARE * float(np.nanmedian(np.linalg.norm(recording.readings[:, :3], axis=1)))
+def _is_unlike(part: Floats, recording: Recording) -> bool:
+    """Whether the samples (n, 3) of a stretch of rest are those of several poses."""
+    samples = part[np.isfinite(part).all(axis=1)]
+    if len(samples) < 2:
+        return False
+    counts = float(np.nanmedian(np.linalg.norm(recording.readings[:, :3], axis=1)))
+    shares = np.linalg.eigvalsh(np.cov(samples.T)) / (STANDARD_GRAVITY if recording.unit == "m_s2" else counts) ** 2
+    turned = shares[2] > _TURNED_SHARE**2 and shares[2] > _TURNED_RATIO**2 * shares[0]
+    return bool(turned or shares[2] > _UNLIKE_SHARE**2)
 
 
 def without_moved_poses(recording: Recording, rest: Rest) -> tuple[Rest, tuple[str, ...]]:

@@ -3,8 +3,8 @@
 The DCT-II turns a record into numbers c_k, k = 1 … n − 1, that are independent: exactly for white noise and a random
 walk, because the cosines are the eigenvectors of their inverse covariance; to a few percent for flicker and
 quantisation. The variance of c_k is rate · S(k rate/2n), S the sum of the spectral densities of the terms (IEEE Std
-952, annex C). Its mean is that of the deterministic terms, a ramp R t and an exponential settling S exp(−t/τ). The c_k are pooled
-in bands of half an octave, and the likelihood is maximised over all terms at once (P. Whittle, "Estimation and
+952, annex C). Its mean is that of the deterministic terms, a ramp R t and an exponential settling S exp(−t/τ). The
+c_k are pooled in bands of half an octave, and the likelihood is maximised over all terms at once (P. Whittle, "Estimation and
 information in stationary time series", Ark. Mat. 2, 1953; restricted likelihood where the ramp and the settling are
 nuisance parameters). Frequencies that a filter or a tone shapes are left out: the terms are fitted up to the highest
 frequency at which they agree with the record.
@@ -432,26 +432,28 @@ def _agreeing(series: Floats, rate: float, present: float) -> _Spectrum:
     c = dct(series - series.mean(), norm="ortho")[1:]
     energy, cross = (np.add.reduceat(x, design.edges, axis=-1) for x in (c**2, c * design.drifts))
     shapes = design.shapes * np.where(np.arange(_RANDOM) < 2, present, 1.0)
-    whole, agreed = None, True
+    tried: list[_Spectrum] = []
+    agreed = True
     for top in range(len(energy), min(len(energy), _POLICY.fewest_bands) - 1, -_POLICY.bands_per_octave):
         settlings = [
-            _Spectrum(design.count[:top], shapes[:top], energy[:top], cross[[0, place], :top].T, gram[:top], constant)
+            _Spectrum(design.number[:top], shapes[:top], energy[:top], cross[[0, place], :top].T, gram[:top], constant)
             for place, (constant, gram) in enumerate(zip(design.constants, design.grams, strict=True), 1)
         ]
         spectrum = max(settlings, key=lambda one: one.maximum(TERMS, False)[0])
         freedom = max(top - len(TERMS), 1)
         spectrum = replace(spectrum, misfit=spectrum.chi_square() / freedom)
-        whole, before, agreed = whole or spectrum, agreed, spectrum.misfit < chi2.isf(_POLICY.fit, freedom) / freedom
+        tried.append(spectrum)
+        before, agreed = agreed, spectrum.misfit < chi2.isf(_POLICY.fit, freedom) / freedom
         if before and agreed:
             return spectrum
-    return replace(whole, scale=whole.misfit)
+    return replace(tried[0], scale=tried[0].misfit)
 
 
 class _Design(NamedTuple):
     """What the bands of records of one length and rate have in common."""
 
     edges: NDArray[np.intp]  # first coefficient of each band, (b,)
-    count: Floats
+    number: Floats  # of coefficients, (b,)
     shapes: Floats
     drifts: Floats  # transforms of R and of S for each time constant, (1 + s, n − 1)
     grams: Floats  # (s, b, 2, 2)
