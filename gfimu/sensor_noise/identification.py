@@ -4,10 +4,10 @@ The DCT-II turns a record into numbers c_k, k = 1 … n − 1, that are independ
 walk, because the cosines are the eigenvectors of their inverse covariance; to a few percent for flicker and
 quantisation. The variance of c_k is rate · S(k rate/2n), S the sum of the spectral densities of the terms (IEEE Std
 952, annex C). Its mean is that of the deterministic terms, a ramp R t and an exponential settling S exp(−t/τ). The
-c_k are pooled in bands of half an octave, and the likelihood is maximised over all terms at once (P. Whittle, "Estimation and
-information in stationary time series", Ark. Mat. 2, 1953; restricted likelihood where the ramp and the settling are
-nuisance parameters). Frequencies that a filter or a tone shapes are left out: the terms are fitted up to the highest
-frequency at which they agree with the record.
+c_k are pooled in bands of half an octave, and the likelihood is maximised over all terms at once (P. Whittle,
+"Estimation and information in stationary time series", Ark. Mat. 2, 1953; restricted likelihood where the ramp and the
+settling are nuisance parameters). Frequencies that a filter or a tone shapes are left out: the terms are fitted up to
+the highest frequency at which they agree with the record.
 
 A term is found when the likelihood, maximised over all the others, drops without it by more than chance explains.
 Where it drops only without each of several terms, the record shows one of them and cannot separate them, such as a
@@ -22,7 +22,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import combinations, product
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -69,6 +69,8 @@ class _Policy:
     settling: tuple[float, ...] = tuple(0.5 * 2.0 ** (-k / 3.0) for k in range(13))  # time constants, of the record
     smooth: float = 50.0  # mean square of the misfit at which a series without white noise is a motion
     iterations: int = 100  # numerical
+    step: float = 0.1  # numerical: first step of the search for the end of an interval
+    flicker_limit: float = 256.0  # numerical: samples beyond which its Allan variance is constant to 1e-5
 
 
 _POLICY = _Policy()
@@ -339,16 +341,18 @@ class _Spectrum:
         x = scored(np.ones(len(mean)), 1.0 / (mean + given))
         if not np.isfinite(loglik(x)):
             x[1] += float(mean.mean())
+        best = loglik(x)
         for _ in range(_POLICY.iterations):
-            variance, best, step = self.shapes @ x[:_RANDOM], loglik(x), 1.0
+            variance, step = self.shapes @ x[:_RANDOM], 1.0
             ahead = scored(variance, np.sqrt(self.count) / variance) - x
-            while loglik(x + step * ahead) < best and step > 1e-3:  # numerical
+            while (higher := loglik(x + step * ahead)) < best and step > 1e-3:  # numerical
                 step /= 2.0
-            if (gain := loglik(x + step * ahead) - best) > 0.0:
-                x = x + step * ahead
-            if gain < 1e-5:  # numerical
+            gain = higher - best
+            if gain > 0.0:
+                x, best = x + step * ahead, higher
+            if gain < 1e-4:  # numerical
                 break
-        return loglik(x), x
+        return best, x
 
     @cached_property
     def _free(self) -> tuple[tuple[float, Floats], tuple[float, Floats]]:
@@ -387,32 +391,23 @@ class _Spectrum:
         """95 % interval of the size of a term by the profile likelihood."""
         place, drift = list(TERMS).index(symbol), symbol in _DRIFTS
         x = self._free[not drift][1]
-        variance = self.shapes @ x[:_RANDOM]
-        if drift:
-            centre, floor = float(x[place]), -math.inf
-            step = float(np.sum(self.gram[:, place - _RANDOM, place - _RANDOM] / variance)) ** -0.5
-        else:
-            centre, floor = math.sqrt(x[place]), 0.0
-            square_std = float(np.sum(self.count / 2.0 * (self.shapes[:, place] / variance) ** 2)) ** -0.5
-            step = math.sqrt(x[place] + square_std) - centre
+        centre, floor = (float(x[place]), -math.inf) if drift else (math.sqrt(x[place]), 0.0)
+        shares = self.gram[:, place - _RANDOM, place - _RANDOM] if drift else self.shapes[:, place]
+        step = _POLICY.step / math.sqrt(
+            np.max(shares / (self.shapes @ x[:_RANDOM]))
+        )  # of what would be the whole noise
 
         def excess(size: float) -> float:
             return math.sqrt(self.drop((), **{symbol: size})) - math.sqrt(_chance(symbol, 0.05))
 
         ends = []
         for side in (-step, step):
-            while excess(outer := max(centre + side, floor)) < 0.0 and outer > floor:
-                side *= 2.0
-            ends.append(brentq(excess, centre, outer, xtol=1e-3 * step) if excess(outer) > 0.0 else floor)
+            outer = max(centre + side, floor)
+            while excess(outer) < 0.0 and outer > floor:
+                outer = max(2.0 * outer - centre, floor)
+            ends.append(brentq(excess, centre, outer, rtol=1e-5) if excess(outer) > 0.0 else floor)
         low, high = sorted(map(abs, ends))
         return low if ends[0] * ends[1] > 0.0 else 0.0, high
-
-    def chi_square(self) -> float:
-        """Sum of the squared levels of the bands as normal numbers (E. B. Wilson & M. M. Hilferty, PNAS 17, 1931)."""
-        _, x = self._free[True]
-        level = self.power(x[_RANDOM:]) / (self.count * (self.shapes @ x[:_RANDOM]))
-        spread = 2.0 / (9.0 * self.count)
-        return float(np.sum((np.cbrt(level) - 1.0 + spread) ** 2 / spread))
 
 
 def _chance(group: Collection[str], probability: float) -> float:
@@ -428,40 +423,47 @@ def _agreeing(series: Floats, rate: float, present: float) -> _Spectrum:
 
     ``present`` is the share of the values that were not filled; fast noise is missing from those that were.
     """
-    design = _design(len(series), rate)
+    edges, count, shapes, drifts, grams, constants = _design(len(series), rate)
     c = dct(series - series.mean(), norm="ortho")[1:]
-    energy, cross = (np.add.reduceat(x, design.edges, axis=-1) for x in (c**2, c * design.drifts))
-    shapes = design.shapes * np.where(np.arange(_RANDOM) < 2, present, 1.0)
+    energy, cross = (np.add.reduceat(x, edges, axis=-1) for x in (c**2, c * drifts))
+    shapes = shapes * np.where(np.arange(_RANDOM) < 2, present, 1.0)
     tried: list[_Spectrum] = []
     agreed = True
     for top in range(len(energy), min(len(energy), _POLICY.fewest_bands) - 1, -_POLICY.bands_per_octave):
         settlings = [
-            _Spectrum(design.number[:top], shapes[:top], energy[:top], cross[[0, place], :top].T, gram[:top], constant)
-            for place, (constant, gram) in enumerate(zip(design.constants, design.grams, strict=True), 1)
+            _Spectrum(count[:top], shapes[:top], energy[:top], cross[[0, place], :top].T, gram[:top], constant)
+            for place, (constant, gram) in enumerate(zip(constants, grams, strict=True), 1)
         ]
         spectrum = max(settlings, key=lambda one: one.maximum(TERMS, False)[0])
+        _, x = spectrum.maximum(TERMS, True)
+        # Levels of the bands as normal numbers by their cube root: E. B. Wilson & M. M. Hilferty, PNAS 17:684, 1931.
+        level, spread = spectrum.power(x[_RANDOM:]) / (spectrum.shapes @ x[:_RANDOM]), 2.0 / (9.0 * spectrum.count)
         freedom = max(top - len(TERMS), 1)
-        spectrum = replace(spectrum, misfit=spectrum.chi_square() / freedom)
+        misfit = float(np.sum((np.cbrt(level / spectrum.count) - 1.0 + spread) ** 2 / spread)) / freedom
+        spectrum = replace(spectrum, misfit=misfit)
         tried.append(spectrum)
-        before, agreed = agreed, spectrum.misfit < chi2.isf(_POLICY.fit, freedom) / freedom
+        before, agreed = agreed, misfit < chi2.isf(_POLICY.fit, freedom) / freedom
         if before and agreed:
             return spectrum
     return replace(tried[0], scale=tried[0].misfit)
 
 
-class _Design(NamedTuple):
-    """What the bands of records of one length and rate have in common."""
-
-    edges: NDArray[np.intp]  # first coefficient of each band, (b,)
-    number: Floats  # of coefficients, (b,)
-    shapes: Floats
-    drifts: Floats  # transforms of R and of S for each time constant, (1 + s, n − 1)
-    grams: Floats  # (s, b, 2, 2)
-    constants: Floats  # (s,), s
-
-
 @lru_cache(maxsize=2)
-def _design(n: int, rate: float) -> _Design:
+def _design(n: int, rate: float) -> tuple[Any, ...]:
+    """Return what the bands of records of one length and rate have in common.
+
+    Returns
+    -------
+    edges : ndarray of int, shape (b,)
+        First coefficient of each band.
+    count : ndarray, shape (b,)
+    shapes : ndarray, shape (b, 4)
+    drifts : ndarray, shape (1 + s, n − 1)
+        Transforms of R and, for each of s time constants, of S.
+    grams : list of ndarray, shape (b, 2, 2)
+    constants : ndarray, shape (s,)
+        Time constants, s.
+    """
     octaves = np.arange(0.0, np.log2(n / _POLICY.single), 1.0 / _POLICY.bands_per_octave)
     edges = np.concatenate([np.arange(_POLICY.single), np.round(_POLICY.single * 2.0**octaves)])
     edges = np.unique(edges[edges < n - 2].astype(int))
@@ -471,21 +473,12 @@ def _design(n: int, rate: float) -> _Design:
     drifts = dct(np.array([t, *(np.exp(-t / constant) for constant in constants)]), norm="ortho")[:, 1:]
     grams = [np.add.reduceat(d * d[:, None], edges, axis=-1).T for d in (drifts[[0, k]] for k in range(1, len(drifts)))]
     shapes = rate * np.add.reduceat(spectra, edges, axis=1).T / count[:, None]
-    return _Design(edges, count, shapes, drifts, np.array(grams), constants)
+    return edges, count, shapes, drifts, grams, constants
 
 
 def _flicker_variance(m: Floats) -> Floats:
-    """Allan variance of sampled flicker noise with B = 1: from its spectrum, by a substitution smooth at both ends."""
-    # u = f/rate; ∫ |H_m|² S df over both signs, S = 1/(2 sin πu): the oscillation of sin⁴ is resolved up to 40/m and
-    # replaced by its mean 3/8 above.
-    result = np.empty(len(m))
-    for index, factor in enumerate(m):
-        split = min(40.0 / factor, 0.5)
-        u = np.linspace(0.0, split, 8001)[1:]
-        low = 2.0 * np.sin(np.pi * u * factor) ** 4 / (factor * np.sin(np.pi * u)) ** 2 / np.sin(np.pi * u)
-        total = float(np.trapezoid(np.concatenate([[0.0], low]), np.concatenate([[0.0], u])))
-        if split < 0.5:
-            v = np.geomspace(split, 0.5, 400)
-            total += float(np.trapezoid(0.75 / (factor * np.sin(np.pi * v)) ** 2 / np.sin(np.pi * v), v))
-        result[index] = total
-    return result
+    """Allan variance of sampled flicker noise with B = 1: ∫ |H_m|² S df with S = 1/(2 sin πu), constant for large m."""
+    u = np.linspace(0.0, 0.5, 8001)[1:]  # f/rate
+    m = np.minimum(m, _POLICY.flicker_limit)[:, None]
+    density = 2.0 * np.sin(np.pi * u * m) ** 4 / (m * np.sin(np.pi * u)) ** 2 / np.sin(np.pi * u)
+    return np.asarray(density.sum(axis=1) * u[0] - density[:, -1] * u[0] / 2.0, dtype=np.float64)

@@ -115,27 +115,32 @@ class RecordingNoise(Declared, PlottedResult):
     def symbols(self) -> tuple[str, ...]:
         """Symbols of the terms worth a column: N, B, K, and others found on a channel."""
         return tuple(
-            symbol for symbol in TERMS if symbol in "NBK" or any(model[symbol].found for model in self.models.values())
+            symbol
+            for symbol in TERMS
+            if symbol in "NBK" or any(model[symbol].found or model[symbol].rivals for model in self.models.values())
         )
 
     def shown(self) -> Iterator[Table]:
         """Yield the table that people read.
 
         A term found is written with its standard deviation in units of the last digit, 0.00453(7); another one as
-        below its 95 % limit.
+        below its 95 % limit, with a star where the record shows it or one that can't be separated from it.
         """
         unit = _UNIT_WORDS.get(self.unit, self.unit)
         rows = []
         for channel, model in self.models.items():
             terms = [model[symbol] for symbol in self.symbols]
-            cells = [_concise(term.value, term.std) if term.found else f"<{term.high:.2g}" for term in terms]
+            cells = [
+                _concise(term.value, term.std) if term.found else f"<{term.high:.2g}{'*' * bool(term.rivals)}"
+                for term in terms
+            ]
             rows.append((channel, *cells, f"{model.allan.bias_instability:.3g}"))
         meanings = [f"{symbol} {TERMS[symbol][0]}, {_times(unit, TERMS[symbol][1])}" for symbol in self.symbols]
         yield Table(
             f"noise over {self.duration_s:.1f} s from {self.start_s:.1f} s, {self.rate:.4g} Hz, readings in {unit}",
             ("channel", *self.symbols, "B by minimum"),
             rows,
-            note="; ".join(meanings) + "; <: not found, 95 % limit",
+            note="; ".join(meanings) + "; <: not seen, 95 % limit; *: the record shows one of these, not which",
         )
 
 
