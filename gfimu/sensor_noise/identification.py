@@ -60,7 +60,8 @@ class _Policy:
     """What the identification of noise terms decides by."""
 
     shortest: int = 200  # samples; fewer give too few bands for the terms
-    entry: float = 0.005  # probability that chance brings in a slow term (B, K, R, S); the same for Q
+    entry: float = 0.005  # probability that chance brings in a slow term: B, K, R or S
+    quantised: float = 1e-4  # the same for Q, which few accelerometers have: they don't integrate
     drift_freedom: float = 4.0  # degrees of freedom of the noise beside a drift: of the lowest coefficients
     fit: float = 0.001  # probability at which the levels of the bands contradict the terms
     bands_per_octave: int = 2
@@ -236,7 +237,7 @@ def identify_noise(values: ArrayLike, rate: float, *, unit: str = "m_s2") -> Noi
         raise InputError(
             "the readings vary too smoothly for noise: the unit moves, or they were filtered; give a recording at rest"
         )
-    quantised = whole.drop("Q") > _chance("Q", _POLICY.entry)
+    quantised = whole.drop("Q") > _chance("Q", _POLICY.quantised)
     spectrum = whole if quantised else replace(whole, terms=("N", *_SLOW))
     groups = spectrum.seen_groups()
     sizes = spectrum.simplest(groups)
