@@ -192,8 +192,9 @@ def calibrate(
     from gfimu.base.units import STANDARD_GRAVITY
     from gfimu.calibration.check_poses import check_on_poses
     from gfimu.calibration.method import CalibrationTask, run_calibration
+    from gfimu.calibration.poses import UNTIMED
     from gfimu.calibration.registry import calibration_method
-    from gfimu.calibration.run_file import UNTIMED, open_poses, open_references
+    from gfimu.calibration.run_file import open_poses, open_references
     from gfimu.recording.doubts.judge import examine, without_doubtful
 
     rests, known = poses or CalibrationPoses(), prior or CalibrationPrior()
@@ -211,7 +212,8 @@ def calibrate(
     def checked(item: "RecordingLike") -> "Recording":
         read = open_poses(source_of(item), array=drawing)
         found = examine(read, drawing, source=name_of(item), force=force)
-        return read if UNTIMED in read.metadata else without_doubtful(read, drawing, found)  # each pose is unlike others
+        # Each row of a table of poses is unlike those around it.
+        return read if UNTIMED in read.metadata else without_doubtful(read, drawing, found)
 
     others: Recording | None = None
     if "rate_table" in chosen.options:

@@ -25,6 +25,7 @@ _LOW_COUNTS = 20.0  # below that counts per g would be too coarse for any part
 _FASTEST_RAD_S = 40.0  # rad/s: beyond the range of nearly all gyros (2000 °/s is 35 rad/s)
 _ROUND = 0.03  # relative scatter of the poses about a sphere: gains of the axes differ by less
 _TURNED = 0.5  # of the radius, by which poses differ along each axis where they show a sphere
+_POSE_LENGTHS = 0.2  # relative scatter of the lengths of poses: with gains and biases of raw readings
 _POSES = 9  # rest poses from which offset and scale of raw counts follow
 _SCALES = {
     ("rad/s", 1.0): "rad/s",
@@ -75,8 +76,10 @@ def triad_values(table: RawTable, columns: Sequence[str]) -> NDArray[np.float64]
 
 
 def rest_windows(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the means of the quietest of equal pieces of a triad, (k, 3): a fifth at most."""
+    """Return the means of the quietest of equal pieces of a triad, (k, 3): a fifth at most; all rows if each is a pose."""
     rows = values[np.isfinite(values).all(axis=1) & values.any(axis=1)]  # zeros throughout: nothing measured yet
+    if _are_poses(rows):
+        return np.asarray(rows)
     size = max(len(rows) // _WINDOWS, 8)
     count = len(rows) // size
     if count < 5:
@@ -86,6 +89,16 @@ def rest_windows(values: NDArray[np.float64]) -> NDArray[np.float64]:
     best = float(np.sort(scatter)[min(_BEST, count) - 1])
     still = max(_AS_QUIET * best, _STEP_SCATTER * _step(rows))
     return np.asarray(means[scatter <= min(float(np.quantile(scatter, 0.2)), still)])
+
+
+def _are_poses(rows: NDArray[np.float64]) -> bool:
+    """Whether each row is a pose at rest: about as long as the others, and turned from the one before."""
+    if len(rows) < _POSES:
+        return False
+    lengths = np.linalg.norm(rows, axis=1)
+    usual = float(np.median(lengths))
+    jumps = np.linalg.norm(np.diff(rows, axis=0), axis=1)
+    return bool(float(np.std(lengths)) < _POSE_LENGTHS * usual and float(np.median(jumps)) > _TURNED * usual)
 
 
 def _step(rows: NDArray[np.float64]) -> float:
