@@ -26,7 +26,7 @@ from gfimu.recording.importing.guessing.parts import (
 )
 from gfimu.recording.importing.guessing.times import RATES, TimeGuess, find_time
 from gfimu.recording.importing.guessing.triads import Triad, find_triads
-from gfimu.recording.importing.guessing.units import unit_of_acceleration
+from gfimu.recording.importing.guessing.units import are_poses, triad_values, unit_of_acceleration
 from gfimu.recording.importing.notation import factor_of
 from gfimu.recording.importing.raw_table import RawFile, RawTable
 from gfimu.recording.importing.splitting import find_split, split_file
@@ -120,6 +120,8 @@ def suggest(raw: RawFile, *, table: str = "", name: str = "map") -> Suggestion:
         for found in (own if other is chosen else _alike(other, chosen, own) if own else [])
     ]
     units = [unit_of_acceleration(one, triad.columns) for one, triad in chips]
+    if any(are_poses(triad_values(one, triad.columns)) for one, triad in chips):
+        reasons.append("each row seems to be a pose at rest and no sample: gfimu calibrate takes a table of poses")
     singles = [] if chips else single_axes(chosen, {*roles, *(name for one in triads for name in one.columns)})
     parts = [
         chip_part(number, chosen, one, triad, unit)

@@ -13,7 +13,16 @@ from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.recording.importing.notation import factor_of, unit_of_name
 from gfimu.recording.importing.raw_table import RawTable
 
-__all__ = ["NEAR", "TriadUnit", "rest_windows", "sphere_of", "triad_values", "unit_of_acceleration", "unit_of_rate"]
+__all__ = [
+    "NEAR",
+    "TriadUnit",
+    "are_poses",
+    "rest_windows",
+    "sphere_of",
+    "triad_values",
+    "unit_of_acceleration",
+    "unit_of_rate",
+]
 
 _GRAVITY = {"m/s^2": 1.0, "g": STANDARD_GRAVITY, "mg": STANDARD_GRAVITY / 1e3, "mm/s^2": 1e-3, "cm/s^2": 1e-2}
 _RARE = {"mm/s^2", "cm/s^2"}  # units that hardly any logger writes
@@ -76,9 +85,9 @@ def triad_values(table: RawTable, columns: Sequence[str]) -> NDArray[np.float64]
 
 
 def rest_windows(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the means of the quietest of equal pieces of a triad, (k, 3): a fifth at most; all rows if each is a pose."""
+    """Return the means of the quietest of equal pieces of a triad, (k, 3), a fifth; all rows if each is a pose."""
     rows = values[np.isfinite(values).all(axis=1) & values.any(axis=1)]  # zeros throughout: nothing measured yet
-    if _are_poses(rows):
+    if are_poses(rows):
         return np.asarray(rows)
     size = max(len(rows) // _WINDOWS, 8)
     count = len(rows) // size
@@ -91,7 +100,7 @@ def rest_windows(values: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(means[scatter <= min(float(np.quantile(scatter, 0.2)), still)])
 
 
-def _are_poses(rows: NDArray[np.float64]) -> bool:
+def are_poses(rows: NDArray[np.float64]) -> bool:
     """Whether each row is a pose at rest: about as long as the others, and turned from the one before."""
     if len(rows) < _POSES:
         return False
