@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -14,13 +15,13 @@ from gfimu.calibration.array_motion import ArrayMotion, array_motion
 from gfimu.calibration.array_shake import array_shake
 from gfimu.calibration.array_static import array_static
 from gfimu.calibration.array_update import array_update
-from gfimu.calibration.faults import check_gravity, check_readings, without_moved_poses
+from gfimu.calibration.faults import check_gravity
+from gfimu.calibration.given import CalibrationPoses
 from gfimu.calibration.motion_reference import has_reference, motion_reference
-from gfimu.calibration.nonlinearity import quadratic_std
-from gfimu.calibration.observations import Observations, averaged_poses
+from gfimu.calibration.poses import find_poses, table_fit
 from gfimu.calibration.result import Calibration
 from gfimu.recording import Recording
-from gfimu.recording.rest import Rest, detect_rest
+from gfimu.recording.rest import detect_rest
 
 __all__ = ["calibrate_array", "update_array_calibration"]
 
@@ -39,6 +40,8 @@ def calibrate_array(
     fit_positions: bool | None = None,
     rest_threshold: float | None = None,
     min_rest_s: float = 2.0,
+    rows: str = "auto",
+    row_noise_m_s2: float | None = None,
     progress: Callable[[float], object] | None = None,
 ) -> Calibration:
     """Calibrate all chips of an array in one body frame, and their positions where there is motion.
@@ -60,6 +63,8 @@ def calibrate_array(
         Threshold of rest, reading unit squared; chosen by the data if not given.
     min_rest_s : float
         Shortest pose, s.
+    rows, row_noise_m_s2
+        As in `gfimu.CalibrationPoses`.
     progress : callable, optional
         Called with the share done of a fit to shakes, 0 to 1.
 
@@ -83,13 +88,17 @@ def calibrate_array(
     Calibration(array, 12 channels in m/s², 60 parameters, 3 directions undetermined)
     """
     warnings = list(check_gravity(gravity))
-    ordered, rest, poses, found = _poses(recording, array, rest_threshold, min_rest_s)
-    result = array_static(poses, array, gravity=gravity)
+    ordered = _in_array_order(recording, array)
+    poses = find_poses(ordered, array, gravity, _asked(rest_threshold, min_rest_s, rows, row_noise_m_s2))
+    fit = partial(array_static, array=array, gravity=gravity)
+    result = table_fit(fit, poses.observations, row_noise_m_s2) if poses.is_table else fit(poses.observations)
     result = replace(
         result,
-        warnings=(*warnings, *found, *result.warnings),
-        statistics={**result.statistics, **_threshold(rest)},
+        warnings=(*warnings, *poses.warnings, *result.warnings),
+        statistics={**result.statistics, **poses.statistics},
     )
+    if poses.is_table and motion is None:
+        return replace(result, statements=(*result.statements, _AS_DRAWN))
     moving = result.apply(ordered if motion is None else _in_array_order(motion, array))
     if fit_positions is False:
         return result
@@ -116,6 +125,8 @@ def update_array_calibration(
     bias_walk_m_s2_rt_s: float = 0.0,
     rest_threshold: float | None = None,
     min_rest_s: float = 2.0,
+    rows: str = "auto",
+    row_noise_m_s2: float | None = None,
 ) -> Calibration:
     """Apply an array's calibration to a later run with new turn-on biases, from a few poses of that run.
 
@@ -135,6 +146,8 @@ def update_array_calibration(
         Threshold of rest, reading unit squared; chosen by the data if not given.
     min_rest_s : float
         Shortest pose, s.
+    rows, row_noise_m_s2
+        As in `gfimu.CalibrationPoses`; the rows of a table need their noise stated.
 
     Returns
     -------
@@ -148,30 +161,26 @@ def update_array_calibration(
     UnitError
         If the recording is in another unit than the calibration.
     """
-    _, rest, poses, found = _poses(recording, array, rest_threshold, min_rest_s)
+    asked = _asked(rest_threshold, min_rest_s, rows, row_noise_m_s2)
+    poses = find_poses(_in_array_order(recording, array), array, calibration.gravity, asked)
+    if poses.is_table and row_noise_m_s2 is None:
+        raise InputError("the poses of an update don't show the noise of a row; state it: --row-noise, m/s²")
     result = array_update(
-        calibration, poses, array, turn_on_std_m_s2=turn_on_std_m_s2, bias_walk_m_s2_rt_s=bias_walk_m_s2_rt_s
+        calibration,
+        poses.observations,
+        array,
+        turn_on_std_m_s2=turn_on_std_m_s2,
+        bias_walk_m_s2_rt_s=bias_walk_m_s2_rt_s,
     )
-    return replace(result, warnings=(*found, *result.warnings), statistics={**result.statistics, **_threshold(rest)})
+    return replace(
+        result,
+        warnings=(*poses.warnings, *result.warnings),
+        statistics={**result.statistics, **poses.statistics},
+    )
 
 
-def _poses(
-    recording: Recording, array: AccelerometerArray, rest_threshold: float | None, min_rest_s: float
-) -> tuple[Recording, Rest, Observations, list[str]]:
-    """Find the poses: recording in the array's order, rest, averaged poses, and warnings."""
-    ordered = _in_array_order(recording, array)
-    rest = detect_rest(ordered, threshold=rest_threshold, min_duration_s=min_rest_s)
-    warnings = list(check_readings(ordered, rest))
-    rest, moved = without_moved_poses(ordered, rest)
-    observations = replace(averaged_poses(ordered, rest), quadratic_std=quadratic_std(ordered, array))
-    return ordered, rest, observations, [*warnings, *moved]
-
-
-def _threshold(rest: Rest) -> dict[str, float | str]:
-    return {
-        "rest_threshold": rest.threshold,
-        "rest_threshold_chosen_by": "data" if rest.chosen_by_data else "user",
-    }
+def _asked(threshold: float | None, min_rest_s: float, rows: str, row_noise_m_s2: float | None) -> CalibrationPoses:
+    return CalibrationPoses(threshold, min_rest_s, rows=rows, row_noise_m_s2=row_noise_m_s2)
 
 
 def _in_array_order(recording: Recording, array: AccelerometerArray) -> Recording:

@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.base.errors import InputError
+from gfimu.calibration.poses import pose_rests
 from gfimu.calibration.result import Calibration
 from gfimu.recording import Recording
-from gfimu.recording.rest import Rest, detect_rest
+from gfimu.recording.rest import Rest
 
 __all__ = ["check_on_poses", "rest_means"]
 
@@ -39,7 +40,7 @@ def check_on_poses(
         ``check_poses``; ``check_rms_m_s2``, the root mean square of |a| − g over poses and chips (Persian calibration
         paper); ``check_largest_m_s2``; ``check_rms_before_m_s2`` with what was read, where that is in m/s²; and
         ``check_rms_by_std``, the root mean square of |a| − g over its standard deviation by the calibration's
-        covariance and the noise of the pose: 1 if the calibration is as good as it states.
+        covariance and the noise of the pose: 1 if the calibration is as good as it states; not of a table of poses.
 
     Raises
     ------
@@ -48,7 +49,7 @@ def check_on_poses(
     """
     if calibration.unit == "rad_s":
         raise InputError("--check compares |a| with gravity; the scale of a gyro does not show at rest")
-    rest = detect_rest(recording, threshold=rest_threshold, min_duration_s=min_rest_s)
+    rest = pose_rests(recording, threshold=rest_threshold, min_duration_s=min_rest_s)
     off = _off(calibration, recording, rest)  # (p, k)
     found = {
         "check_poses": float(len(rest)),
@@ -58,6 +59,8 @@ def check_on_poses(
     if recording.unit == "m_s2":
         before = np.linalg.norm(rest_means(recording, calibration, rest), axis=2) - calibration.gravity
         found["check_rms_before_m_s2"] = float(np.sqrt(np.nanmean(before**2)))
+    if rest.lengths.min() < 2:  # rows of a table, whose noise isn't in them
+        return found
     variance = _noise_variance(calibration, recording, rest) + _parameter_variance(calibration, recording, rest, off)
     found["check_rms_by_std"] = float(np.sqrt(np.nanmean(off**2 / variance)))
     return found

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.base.errors import InputError
+from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.calibration.coverage import distinct_poses, pose_directions, pose_label
 from gfimu.calibration.result import Calibration
 from gfimu.recording import Recording
@@ -25,6 +26,9 @@ _STUCK_SHARE = 0.01
 _MOVED_SHARE = 5e-4
 _MOVED_SIGMA = 8.0
 _COMMON_SCALE = 0.01
+_NAMED_GROUPS = 6  # of poses that repeat each other, in a warning
+_UNLIKE_SHARE = 0.05  # of gravity: scatter beyond the noise of any sample at rest
+_TURNED_SHARE, _TURNED_RATIO = 0.02, 3.0  # of gravity, beyond coarse counts; of the scatter across it
 
 
 def check_gravity(gravity: float) -> tuple[str, ...]:
@@ -86,31 +90,55 @@ def check_readings(recording: Recording, rest: Rest) -> tuple[str, ...]:
 def moved_poses(recording: Recording, rest: Rest) -> list[int]:
     """Find the poses (from 0) whose first and last third differ by more than noise and 0.05 % of the full range.
 
-    Such a pose turned or crept while it was recorded.
+    Such a pose turned or crept while it was recorded. So did one whose samples scatter far more along one direction
+    than along another, or by a good part of gravity: several poses do, and noise doesn't.
     """
     parts = [recording.readings[a:b] for a, b in zip(rest.start, rest.stop, strict=True)]
-    if len(parts) < 2:
-        return []
+    unlike = [index for index, part in enumerate(parts) if _is_unlike(part[:, :3], recording)]
+    if len(parts) < 2 or len(unlike) == len(parts):
+        return unlike
     scale = float(np.max(np.ptp([np.nanmean(part, axis=0) for part in parts], axis=0)))
     noise = np.sqrt(np.median([np.nanvar(part, axis=0) for part in parts], axis=0))
-    moved = []
+    moved = unlike
     for index, part in enumerate(parts):
         third = len(part) // 3
-        if third < 3:
+        if third < 3 or index in unlike:
             continue
         step = np.abs(np.nanmean(part[-third:], axis=0) - np.nanmean(part[:third], axis=0))
         if np.any((step > _MOVED_SIGMA * noise * np.sqrt(2.0 / third)) & (step > _MOVED_SHARE * scale)):
             moved.append(index)
-    return moved
+    return sorted(moved)
+
+
+def _is_unlike(part: Floats, recording: Recording) -> bool:
+    """Whether the samples (n, 3) of a stretch of rest are those of several poses."""
+    samples = part[np.isfinite(part).all(axis=1)]
+    if len(samples) < 2:
+        return False
+    counts = float(np.nanmedian(np.linalg.norm(recording.readings[:, :3], axis=1)))
+    shares = np.linalg.eigvalsh(np.cov(samples.T)) / (STANDARD_GRAVITY if recording.unit == "m_s2" else counts) ** 2
+    turned = shares[2] > _TURNED_SHARE**2 and shares[2] > _TURNED_RATIO**2 * shares[0]
+    return bool(turned or shares[2] > _UNLIKE_SHARE**2)
 
 
 def without_moved_poses(recording: Recording, rest: Rest) -> tuple[Rest, tuple[str, ...]]:
-    """Leave out poses that moved while they were recorded, and say which."""
+    """Leave out poses that moved while they were recorded, and say which.
+
+    Raises
+    ------
+    InputError
+        If every pose moved.
+    """
     moved = moved_poses(recording, rest)
     if not moved:
         return rest, ()
     places = ", ".join(f"{number + 1} ({recording.t_s[rest.start[number]]:.1f} s)" for number in moved)
     kept = np.setdiff1d(np.arange(len(rest)), moved)
+    if not len(kept):
+        raise InputError(
+            f"the samples of all {len(rest)} stretches of rest differ as those of several poses do (0.05 g and more); "
+            "hold each pose still, or, where every row is a pose, add --rows poses"
+        )
     text = f"poses that moved while recorded, left out: {places}"
     return replace(rest, start=rest.start[kept], stop=rest.stop[kept]), (text,)
 
@@ -122,8 +150,10 @@ def repeated_poses(means: Floats) -> tuple[str, ...]:
     if not groups:
         return ()
     names = "; ".join(
-        f"{', '.join(str(number + 1) for number in group)} ({pose_label(directions[group[0]])})" for group in groups
+        f"{', '.join(str(number + 1) for number in group)} ({pose_label(directions[group[0]])})"
+        for group in groups[:_NAMED_GROUPS]
     )
+    names += f" and {len(groups) - _NAMED_GROUPS} groups more" if len(groups) > _NAMED_GROUPS else ""
     return (f"poses that repeat each other: {names}; they add weight but no coverage",)
 
 

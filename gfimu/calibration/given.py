@@ -33,6 +33,10 @@ class CalibrationPoses:
     wavelet : mapping
         With the wavelet input: ``level`` of the transform, and ``threshold``, what becomes of its details
         (`gfimu.calibration.observations.denoised_samples`).
+    rows : {"auto", "poses", "samples"}
+        Whether every row is a pose, or a sample of a series with rests; judged by the data if not given.
+    row_noise_m_s2 : float, optional
+        Of a table of poses: standard deviation of a reading, m/s²; from the residuals of the fit if not given.
 
     Examples
     --------
@@ -46,6 +50,8 @@ class CalibrationPoses:
     levelling_std_rad: float | None = None
     input_kind: str = "averaged"
     wavelet: Mapping[str, Any] = field(default_factory=dict)
+    rows: str = "auto"
+    row_noise_m_s2: float | None = None
 
 
 @dataclass(frozen=True)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
 
 from gfimu.array.array import AccelerometerArray
 from gfimu.base.units import STANDARD_GRAVITY
-from gfimu.calibration.given import RateTable
+from gfimu.calibration.given import CalibrationPoses, RateTable
 from gfimu.calibration.result import Calibration
 from gfimu.recording import Recording
 
@@ -95,6 +95,8 @@ class CalibrationTask:
         What a gyro on a rate table needs besides.
     wavelet : mapping
         Options of `gfimu.calibration.observations.denoised_samples`, for the wavelet input.
+    rows, row_noise_m_s2
+        As in `gfimu.CalibrationPoses`.
     progress : callable, optional
         Called with the share done of a fit that takes long, 0 to 1.
     """
@@ -117,7 +119,14 @@ class CalibrationTask:
     latitude_deg: float | None = None
     rate_table: RateTable | None = None
     wavelet: Mapping[str, Any] = field(default_factory=dict)
+    rows: str = "auto"
+    row_noise_m_s2: float | None = None
     progress: Callable[[float], object] | None = None
+
+    @property
+    def poses(self) -> CalibrationPoses:
+        """How the poses are found."""
+        return CalibrationPoses(**{item.name: getattr(self, item.name) for item in fields(CalibrationPoses)})
 
 
 def run_calibration(method: CalibrationMethod, task: CalibrationTask) -> Calibration:

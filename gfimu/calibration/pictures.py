@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from gfimu.base.results import save_figure
 from gfimu.base.results.colours import AFTER_ON_PAPER, BEFORE_ON_PAPER, DIVERGING, INK, chip_colour, css
 from gfimu.calibration.check_poses import rest_means
+from gfimu.calibration.poses import pose_rests
 from gfimu.calibration.result import Calibration
 from gfimu.recording import Recording
-from gfimu.recording.rest import Rest, detect_rest
+from gfimu.recording.rest import Rest
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -59,7 +60,7 @@ def calibration_figure(calibration: Calibration, recording: Recording | None = N
     """
     count = len(calibration.names)
     side = max(6.0, _PER_LABEL_IN * min(count, _MOST_NAMED) + 1.5)
-    rest = None if recording is None or calibration.unit == "rad_s" else detect_rest(recording)
+    rest = None if recording is None or calibration.unit == "rad_s" else pose_rests(recording)
     across = 0.0 if rest is None else max(6.5, 0.2 * len(rest) + 2.5)
     figure = Figure(figsize=(side + across + 1.0, side + 0.8), layout="constrained")
     figure.suptitle(f"Calibration: {calibration.method}, {len(calibration.chips)} triad(s), {count} parameters")

@@ -24,6 +24,8 @@ from gfimu.calibration.twelve_position import twelve_position
 
 __all__ = ["METHODS", "CalibrationMethod", "calibration_method"]
 
+_ROWS = ("rows", "row_noise_m_s2")
+
 _RECORDS = (
     CalibrationMethod(
         "six-position",
@@ -33,7 +35,7 @@ _RECORDS = (
         estimates="M and b of each chip",
         source="Persian calibration paper, section 2.3.1, eqs 5-8",
         gauges={12: "poses", 9: "x_axis"},
-        options=frozenset({"n_parameters", "input_kind", "levelling_std_rad"}),
+        options=frozenset({"n_parameters", "input_kind", *_ROWS, "levelling_std_rad"}),
     ),
     CalibrationMethod(
         "recursive",
@@ -43,7 +45,7 @@ _RECORDS = (
         estimates="M and b of each chip, by way of the inverse model",
         source="Persian calibration paper, section 2.3.3, eqs 9-16",
         gauges={12: "poses", 9: "x_axis"},
-        options=frozenset({"n_parameters", "input_kind"}),
+        options=frozenset({"n_parameters", "input_kind", *_ROWS}),
     ),
     CalibrationMethod(
         "multi-position",
@@ -53,7 +55,7 @@ _RECORDS = (
         estimates="triangular M and b of each chip",
         source="Persian calibration paper, section 2.3.2",
         gauges={9: "x_axis", 12: "coarse"},
-        options=frozenset({"n_parameters", "input_kind"}),
+        options=frozenset({"n_parameters", "input_kind", *_ROWS}),
     ),
     CalibrationMethod(
         "twelve-position",
@@ -63,7 +65,7 @@ _RECORDS = (
         estimates="M and b of each chip, the common rotation from the faces",
         source="Chinese calibration paper",
         gauges={12: "coarse", 9: "x_axis"},
-        options=frozenset({"n_parameters", "input_kind", "levelling_std_rad"}),
+        options=frozenset({"n_parameters", "input_kind", *_ROWS, "levelling_std_rad"}),
     ),
     CalibrationMethod(
         "array",
@@ -72,7 +74,7 @@ _RECORDS = (
         needs="nine or more poses, any direction; one or more to update an earlier calibration",
         estimates="M and b of all chips in one body frame, positions where there is motion",
         source="conditions |a_1| = g and a_i = a_1, gfimu.calibration.array_static and array_motion",
-        options=frozenset({"array", "motion", "update"}),
+        options=frozenset({"array", "motion", "update", *_ROWS}),
         min_rest_s=2.0,
     ),
     CalibrationMethod(

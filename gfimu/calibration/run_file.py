@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import cast
 
 import numpy as np
+import pyarrow as pa
 
 from gfimu.array.array import AccelerometerArray
 from gfimu.base.errors import InputError
 from gfimu.base.files.input_file import is_ordinary
 from gfimu.calibration.imu_tk import read_text_triad
+from gfimu.calibration.poses import UNTIMED
 from gfimu.calibration.result import Calibration
 from gfimu.recording import Recording
 from gfimu.recording.carried_array import array_difference
@@ -18,7 +21,7 @@ from gfimu.recording.formats import format_of_recording, open_run
 from gfimu.recording.mapped import MappedFile, RecordingSource, mapped_reference
 from gfimu.recording.tables.column_file import open_columns
 
-__all__ = ["open_calibrated", "open_calibrated_run", "open_references", "open_uncalibrated"]
+__all__ = ["open_calibrated", "open_calibrated_run", "open_poses", "open_references", "open_uncalibrated"]
 
 _TEXT = (".txt", ".txt.gz")
 
@@ -35,6 +38,25 @@ def open_uncalibrated(path: RecordingSource, *, array: AccelerometerArray | None
         As `gfimu.Recording.read` and the importers.
     """
     return _open(path, array, None)
+
+
+def open_poses(path: RecordingSource, *, array: AccelerometerArray | None = None) -> Recording:
+    """Read a recording as `open_uncalibrated`, or a CSV or Parquet table of poses, which has no times.
+
+    Raises
+    ------
+    InputError
+        As `open_uncalibrated`.
+    """
+    if isinstance(path, str | Path) and not str(path).endswith(_TEXT) and format_of_recording(path) is None:
+        table = open_columns(path)
+        if not any(name == "t" or name.startswith("t_") for name in table.names):
+            columns = table.read_as_found(table.names)
+            numbers = np.arange(len(next(iter(columns.values()))), dtype=float)
+            unit = "lsb" if any(name.endswith("_lsb") for name in columns) else "m_s2"
+            read = Recording.from_table(pa.table({"t_s": numbers, **columns}), array=array, unit=unit)
+            return replace(read, metadata={**read.metadata, UNTIMED: True})
+    return open_uncalibrated(path, array=array)
 
 
 def open_references(path: RecordingSource) -> Recording:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -12,16 +13,14 @@ from gfimu.calibration.array_calibration import update_array_calibration
 from gfimu.calibration.combine import combine
 from gfimu.calibration.faults import (
     check_gravity,
-    check_readings,
     repeated_poses,
     scale_warning,
-    without_moved_poses,
 )
 from gfimu.calibration.fit_quality import mean_factor
 from gfimu.calibration.given import RateTable
 from gfimu.calibration.method import CalibrationMethod, CalibrationTask
-from gfimu.calibration.nonlinearity import quadratic_std
 from gfimu.calibration.observations import Observations, observations_from
+from gfimu.calibration.poses import find_poses, table_fit
 from gfimu.calibration.rate_table import body_axis, find_plateaus
 from gfimu.calibration.result import Calibration
 from gfimu.calibration.spin.policy import SpinPolicy
@@ -41,14 +40,9 @@ def calibrate_triads(method: CalibrationMethod, task: CalibrationTask) -> Calibr
     """Calibrate every triad of a recording of static poses by itself; the runner of the methods for one triad."""
     recording, gauge = task.recording, _gauge(method, task.n_parameters)
     warnings = list(check_gravity(task.gravity))
-    rest = detect_rest(recording, threshold=task.rest_threshold, min_duration_s=_min_rest(method, task))
-    warnings += check_readings(recording, rest)
-    rest, moved = without_moved_poses(recording, rest)
-    warnings += moved
-    observations = replace(
-        observations_from(recording, rest, task.input_kind, **task.wavelet),
-        quadratic_std=quadratic_std(recording, task.array),
-    )
+    poses = find_poses(recording, task.array, task.gravity, task.poses, method.min_rest_s)
+    observations = poses.observations
+    warnings += poses.warnings
     options: dict[str, float] = {}
     if task.levelling_std_rad is not None and "levelling_std_rad" in method.options:
         options["levelling_std_rad"] = task.levelling_std_rad
@@ -56,7 +50,8 @@ def calibrate_triads(method: CalibrationMethod, task: CalibrationTask) -> Calibr
 
     def fits() -> list[Calibration]:
         each = (observations.of_chip(chip) for chip in observations.chips)
-        return [fit(one, gravity=task.gravity, gauge=gauge, **options) for one in each]
+        bound = partial(fit, gravity=task.gravity, gauge=gauge, **options)
+        return [table_fit(bound, one, task.poses.row_noise_m_s2) if poses.is_table else bound(one) for one in each]
 
     results = fits()
     if len(results) > 1 and observations.kind == "averaged":
@@ -70,11 +65,9 @@ def calibrate_triads(method: CalibrationMethod, task: CalibrationTask) -> Calibr
         warnings=(*warnings, *result.warnings),
         statistics={
             **result.statistics,
-            "rest_threshold": rest.threshold,
-            "rest_threshold_chosen_by": "data" if rest.chosen_by_data else "user",
-            "poses_found": float(len(rest)),
+            **poses.statistics,
             "noise_correlation_factor": observations.correlation_factor,
-            **_weights(observations),
+            **({} if poses.is_table else _weights(observations)),
         },
     )
 
@@ -113,6 +106,8 @@ def calibrate_whole_array(method: CalibrationMethod, task: CalibrationTask) -> C
             bias_walk_m_s2_rt_s=task.bias_walk_m_s2_rt_s,
             rest_threshold=task.rest_threshold,
             min_rest_s=_min_rest(method, task),
+            rows=task.rows,
+            row_noise_m_s2=task.row_noise_m_s2,
         )
     return method.fit(
         task.recording,
@@ -121,6 +116,8 @@ def calibrate_whole_array(method: CalibrationMethod, task: CalibrationTask) -> C
         motion=task.motion,
         rest_threshold=task.rest_threshold,
         min_rest_s=_min_rest(method, task),
+        rows=task.rows,
+        row_noise_m_s2=task.row_noise_m_s2,
         progress=task.progress,
     )
 

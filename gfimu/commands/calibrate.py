@@ -40,6 +40,8 @@ _OPTION_NAMES = {
     "levelling_std_rad": "--levelling-std is the tilt of levelled faces",
     "n_parameters": "--parameters chooses the model of single chips",
     "input_kind": "--input chooses the rows for single chips",
+    "rows": "--rows is of poses",
+    "row_noise_m_s2": "--row-noise is of a table of poses",
     "start": "--calibration is what a spin starts from",
     "radius_std_m": "--radius-std is of the arms on a turntable",
     "stretch_std_s2_rad2": "--stretch-std is of the arms on a turntable",
@@ -79,6 +81,13 @@ _THRESHOLD = Option(
 )
 
 
+_ROWS = Option(
+    "What every row is: poses (one each, a table), samples (of a series), or auto: judged by the data.",
+    "KIND", offers=("auto", "poses", "samples"),
+)  # fmt: skip
+_ROW_NOISE = Option("Of a table of poses: standard deviation of a reading, m/s²; else from the residuals of the fit.")
+
+
 def _poses_of(
     input_kind: Annotated[str, _INPUT] = "averaged",
     wavelet_level: Annotated[int | None, Option("With --input wavelet: level of the transform; 4 by default.")] = None,
@@ -86,10 +95,12 @@ def _poses_of(
     rest_threshold: Annotated[float | None, options.REST_THRESHOLD] = None,
     min_rest: Annotated[float | None, Option("Shortest pose, s; 1 by default, 2 for array.")] = None,
     levelling_std: Annotated[float | None, Option("Standard deviation of a pose's tilt per axis, rad.")] = None,
+    rows: Annotated[str, _ROWS] = "auto",
+    row_noise: Annotated[float | None, _ROW_NOISE] = None,
 ) -> CalibrationPoses:
     stated = {"level": wavelet_level, "threshold": wavelet_threshold}
     wavelet = {key: value for key, value in stated.items() if value is not None}
-    return CalibrationPoses(rest_threshold, min_rest, levelling_std, input_kind, wavelet)
+    return CalibrationPoses(rest_threshold, min_rest, levelling_std, input_kind, wavelet, rows, row_noise)
 
 
 _UPDATE = Option("array: calibration of an earlier run to carry over; the biases may have moved.", reads=True)
@@ -182,14 +193,14 @@ def calibrate(
     from gfimu.calibration.check_poses import check_on_poses
     from gfimu.calibration.method import CalibrationTask, run_calibration
     from gfimu.calibration.registry import calibration_method
-    from gfimu.calibration.run_file import open_references, open_uncalibrated
+    from gfimu.calibration.run_file import UNTIMED, open_poses, open_references
     from gfimu.recording.doubts.judge import examine, without_doubtful
 
     rests, known = poses or CalibrationPoses(), prior or CalibrationPrior()
     chosen = calibration_method("gyro-rate-table" if rate_table and method == "gyro" else method)
     rows = None if rests.input_kind == "averaged" and not rests.wavelet else rests.input_kind
     asked = {**vars(known), **vars(rests), "motion": motion, "n_parameters": parameters, "rate_table": rate_table}
-    _refuse_unused(chosen, {**asked, "input_kind": rows})
+    _refuse_unused(chosen, {**asked, "input_kind": rows, "rows": None if rests.rows == "auto" else rests.rows})
     drawing = None if array is None else as_array(array)
     latitude = gravity if isinstance(gravity, Latitude) else None
     local_gravity = gravity.gravity if isinstance(gravity, Latitude) else gravity
@@ -198,8 +209,9 @@ def calibrate(
         return as_source(item, array, column_map, max_memory=max_memory)
 
     def checked(item: "RecordingLike") -> "Recording":
-        read = open_uncalibrated(source_of(item), array=drawing)
-        return without_doubtful(read, drawing, examine(read, drawing, source=name_of(item), force=force))
+        read = open_poses(source_of(item), array=drawing)
+        found = examine(read, drawing, source=name_of(item), force=force)
+        return read if UNTIMED in read.metadata else without_doubtful(read, drawing, found)  # each pose is unlike others
 
     others: Recording | None = None
     if "rate_table" in chosen.options:

@@ -91,6 +91,7 @@ class Converted(_Shown):
     dropped_rows_untimed: Annotated[int | None, _left_out("for a missing time")] = None
     dropped_rows_corrupt: Annotated[int | None, _left_out("as corrupt")] = None
     dropped_rows_out_of_range: Annotated[int | None, _left_out("as out of range")] = None
+    dropped_rows_wrong_read: Annotated[int | None, _left_out("as misread")] = None
     dropped_rows_missing: Annotated[int | None, _left_out("for a missing value")] = None
 
 
@@ -164,7 +165,9 @@ _TARGET = Option(
     what=_kind_of,
 )
 _DROP = Option(
-    "Rows to leave out, counted: corrupt, out_of_range, missing, duplicates, unordered.", "KIND,...", kind=str
+    "Rows to leave out, counted: corrupt, out_of_range, missing, wrong_read, duplicates, unordered.",
+    "KIND,...",
+    kind=str,
 )
 _TO = Option(
     "Of a calibration, the format: kalibr or ros. Of an array: turntable, motor_turntable or free_cube.",

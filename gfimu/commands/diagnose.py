@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 __all__ = ["FOLDER", "diagnose", "write_report"]
 
-EXPLAINED = frozenset({"sign", "exchange", "dead", "rest_bias"})
+EXPLAINED = frozenset({"sign", "exchange", "dead", "rest_bias", "clipped", "frozen", "wrong_read", "corrupt"})
 """Findings of a recording's checks that are effects of the library: the diagnosis explains them."""
 
 FOLDER = OutputFolder(("verdict.json", "twin.toml", "report.html", "diagnosis.rrd", "array.toml"))

@@ -121,6 +121,9 @@ def estimate(
     """
     chosen = rate_method(method)
     found = refuse_or_warn(doubts_of(recording, array) if findings is None else findings, force=force)
+    # The watch of the recursive methods finds frozen channels by itself, and reports when.
+    used_as = {"frozen"} if chosen.recursive else set()
+    found = tuple(one for one in found if one.kind not in used_as)
     recording = without_doubtful(recording, array, [one for one in found if one.kind != "clipped"])
     missing = np.isnan(recording.for_array(array))  # (n, c)
     recording = without_doubtful(recording, array, found)

@@ -1,9 +1,10 @@
 """Recordings with rows left out on request (``drop`` of a column map), each kind counted and reported.
 
 ``corrupt``: a channel has a value that can be no measurement, as 1e19. ``out_of_range``: a channel reads more than its
-part can. ``missing``: a channel has no value, as in a burst of NaN. ``duplicates``: the time of another row.
-``unordered``: a time that goes back, or a wild one. Without the request such values of `corrupt` rows alone are left
-out, `missing` ones stay missing, and a recording of gfimu's whose times do not increase is refused.
+part can. ``missing``: a channel has no value, as in a burst of NaN. ``wrong_read``: a chip has a
+reading that is zero or a multiple of those around it, as where a register is misread. ``duplicates``: the time of
+another row. ``unordered``: a time that goes back, or a wild one. Without the request such values of `corrupt` rows
+alone are left out, `missing` ones stay missing, and a recording of gfimu's whose times do not increase is refused.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from gfimu.array.array import AccelerometerArray
 from gfimu.array.parts.plausible import rails_of_array
 from gfimu.base.errors import InputError, warn
 from gfimu.base.files.metadata import schema_metadata
+from gfimu.recording.doubts.samples import chips_of, wrong_reads
 from gfimu.recording.importing.clock import increasing_times
 from gfimu.recording.importing.column_map import ColumnMap, TimeSpec
 from gfimu.recording.importing.recognise import map_hint
@@ -36,6 +38,7 @@ _SAID = {
     "corrupt": "with a value that can be no measurement",
     "out_of_range": "with a reading beyond the range of its part",
     "missing": "in which a channel has no value",
+    "wrong_read": "with a reading that is zero or a multiple of those around it",
 }
 
 
@@ -97,7 +100,7 @@ def without_rows(
     recording : Recording
         As it was read: corrupt values are NaN.
     drop : collection of str
-        ``corrupt``, ``out_of_range``, ``missing``; other kinds were left out when the times were read.
+        ``corrupt``, ``out_of_range``, ``missing``, ``wrong_read``; other kinds were left out when the times were read.
     absent : ndarray of bool, shape (n, c)
         Readings that the file itself had not.
     source : str
@@ -112,6 +115,8 @@ def without_rows(
     """
     unknown = np.isnan(recording.readings)
     rows = {"corrupt": (unknown & ~absent).any(axis=1), "missing": absent.any(axis=1)}
+    if "wrong_read" in drop:
+        rows["wrong_read"] = _misread(recording)
     if "out_of_range" in drop:
         rows["out_of_range"] = _out_of_range(recording, array or recording.array, source)
     kept = np.ones(len(recording), dtype=bool)
@@ -193,6 +198,16 @@ def _ordered(table: ColumnFile, column_map: ColumnMap) -> tuple[TableColumns, Ma
     whole = TableColumns(pa.table(columns).replace_schema_metadata(schema_metadata(table.metadata)))
     whole.file = str(table.file)
     return whole, dropped
+
+
+def _misread(recording: Recording) -> NDArray[np.bool_]:
+    """Mark the rows (n,) in which a register of a chip was misread."""
+    found = np.zeros(len(recording), dtype=bool)
+    columns = dict(zip(recording.channels, recording.readings.T, strict=True))
+    for chip in chips_of(recording.channels):
+        for one in wrong_reads({name: columns[name] for name in chip}):
+            found[one.rows] |= one.is_no_reading
+    return found
 
 
 def _out_of_range(recording: Recording, array: AccelerometerArray | None, source: str) -> NDArray[np.bool_]:

@@ -83,6 +83,8 @@ class SamplePolicy:
         Equal readings in a row that show nothing yet [count]. By choice.
     chance : float
         Probability of a run of equal readings by chance from which the channel was frozen. By choice.
+    least_repeats : float
+        Share of readings that repeat the one before, at least assumed [ratio]. By choice: of fine steps few are seen.
     around : int
         Readings before and after a value that is held, which show whether the signal joins it [count]. By choice.
     jump : float
@@ -91,6 +93,8 @@ class SamplePolicy:
         White noise beside the median of the channels [ratio]. By choice.
     sentinel_apart : float
         Distance of a number that stands for a missing one from all others [their range]. By choice.
+    quietest : float
+        White noise of one reading of the quietest accelerometer whose part is not known [m/s²]. 1 µg/√Hz at 100 Hz.
     least_noise : float
         White noise beside the data sheet's, from which a channel surely has noise of its own [ratio]. By choice.
     """
@@ -111,10 +115,12 @@ class SamplePolicy:
     garbage: int = 5
     longest_equal: int = 40
     chance: float = 1e-6
+    least_repeats: float = 0.05
     around: int = 6
     jump: float = 6.0
     noisy: float = 3.0
     sentinel_apart: float = 3.0
+    quietest: float = 1e-4
     least_noise: float = 0.3
 
 

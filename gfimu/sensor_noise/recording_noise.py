@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
 import numpy as np
@@ -19,6 +19,7 @@ from gfimu.recording.quantities import TIME_COLUMNS
 from gfimu.recording.rest import detect_rest
 from gfimu.recording.timing.reference_times import reference_series
 from gfimu.sensor_noise.identification import TERMS, NoiseModel, identify_noise
+from gfimu.sensor_noise.missing import without_isolated
 
 __all__ = ["STRETCHES", "RecordingNoise", "recording_noise"]
 
@@ -114,27 +115,32 @@ class RecordingNoise(Declared, PlottedResult):
     def symbols(self) -> tuple[str, ...]:
         """Symbols of the terms worth a column: N, B, K, and others found on a channel."""
         return tuple(
-            symbol for symbol in TERMS if symbol in "NBK" or any(model[symbol].found for model in self.models.values())
+            symbol
+            for symbol in TERMS
+            if symbol in "NBK" or any(model[symbol].found or model[symbol].rivals for model in self.models.values())
         )
 
     def shown(self) -> Iterator[Table]:
         """Yield the table that people read.
 
         A term found is written with its standard deviation in units of the last digit, 0.00453(7); another one as
-        below its 95 % limit.
+        below its 95 % limit, with a star where the record shows it or one that can't be separated from it.
         """
         unit = _UNIT_WORDS.get(self.unit, self.unit)
         rows = []
         for channel, model in self.models.items():
             terms = [model[symbol] for symbol in self.symbols]
-            cells = [_concise(term.value, term.std) if term.found else f"<{term.high:.2g}" for term in terms]
+            cells = [
+                _concise(term.value, term.std) if term.found else f"<{term.high:.2g}{'*' * bool(term.rivals)}"
+                for term in terms
+            ]
             rows.append((channel, *cells, f"{model.allan.bias_instability:.3g}"))
         meanings = [f"{symbol} {TERMS[symbol][0]}, {_times(unit, TERMS[symbol][1])}" for symbol in self.symbols]
         yield Table(
             f"noise over {self.duration_s:.1f} s from {self.start_s:.1f} s, {self.rate:.4g} Hz, readings in {unit}",
             ("channel", *self.symbols, "B by minimum"),
             rows,
-            note="; ".join(meanings) + "; <: not found, 95 % limit",
+            note="; ".join(meanings) + "; <: not seen, 95 % limit; *: the record shows one of these, not which",
         )
 
 
@@ -157,7 +163,7 @@ def recording_noise(
     Parameters
     ----------
     recording : Recording
-        Recording with a long rest.
+        Recording with a long rest. Isolated wrong reads are left out.
     stretch : {"rest", "all"}
         Use the longest rest (default), or all samples up to the first gap.
     rest_threshold : float, optional
@@ -168,7 +174,7 @@ def recording_noise(
     Raises
     ------
     InputError
-        If there is no rest, or a channel has missing samples or does not vary.
+        If there is no rest, or a channel lacks more than a few samples or does not vary.
 
     Examples
     --------
@@ -177,6 +183,7 @@ def recording_noise(
     'm_s2'
     """
     check_name("stretch", stretch, STRETCHES)
+    recording = replace(recording, readings=np.apply_along_axis(without_isolated, 0, recording.readings))
     if stretch == "all":
         gaps = recording.gaps
         start, stop = 0, int(gaps[0]) + 1 if len(gaps) else len(recording)
@@ -196,8 +203,6 @@ def recording_noise(
         series |= {name: _gyro_series(part, f"{name}_rad_s") for name in names}
     models = {}
     for name, (values, own_rate) in series.items():
-        if not np.isfinite(values).all():
-            raise InputError(f"channel {name} has missing samples in the stretch used; choose another run")
         try:
             unit = "rad_s" if name.startswith("gyro") else recording.unit
             models[name] = identify_noise(values, own_rate, unit=unit)

@@ -288,7 +288,7 @@ def rest_drift(
     starts = _windows(recording, readings, before + after + 1)
     _refuse_spin(recording, array, [readings[start : start + before] for start in starts])
     noise = recording_noise(recording, gyros=False)
-    squares = np.array([[noise.models[name][symbol].value ** 2 for name in array.channels] for symbol in TERMS])
+    squares = np.array([noise.models[name].fitted_squares for name in array.channels]).T
     t = np.arange(after + 1, dtype=np.float64) * recording.sample_period
     times = np.linspace(0.0, t[-1], _TIMES + 1)[1:]
     response = NoiseResponse.of(times, before, recording.sample_rate, gravity)
@@ -362,7 +362,8 @@ class NoiseResponse:
         once = np.array([((twice * one) @ twice.conj().T).real for one in spectra])
         from_alpha, crossed = spectra @ np.abs(four.T) ** 2, spectra @ (twice * four.conj()).real.T
         ramp, ramp_of_alpha = weights @ np.arange(weights.shape[2]) / rate  # no noise: its slope has an unknown sign
-        once[-1], from_alpha[-1], crossed[-1] = np.outer(ramp, ramp), ramp_of_alpha**2, ramp * ramp_of_alpha
+        place = list(TERMS).index("R")
+        once[place], from_alpha[place], crossed[place] = np.outer(ramp, ramp), ramp_of_alpha**2, ramp * ramp_of_alpha
         return cls(t_s, once, from_alpha, crossed, gravity)
 
     def prediction(self, squares: Floats) -> tuple[Floats, Floats, Floats]:
@@ -370,7 +371,7 @@ class NoiseResponse:
 
         Parameters
         ----------
-        squares : ndarray, shape (5, 6, 6)
+        squares : ndarray, shape (6, 6, 6)
             Squared coefficients of the terms, in the order of `gfimu.sensor_noise.identification.TERMS`, as covariance
             of α and p in world axes.
 

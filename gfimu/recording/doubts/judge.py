@@ -23,7 +23,7 @@ from gfimu.base.errors import InputError, warn
 from gfimu.recording.carried_array import warn_of_other_array
 from gfimu.recording.doubts.doubt import Doubt
 from gfimu.recording.doubts.rails import rails_of
-from gfimu.recording.doubts.samples import sample_doubts, typical_noise
+from gfimu.recording.doubts.samples import chips_of, sample_doubts, typical_noise
 from gfimu.recording.doubts.stamps import stamp_doubts
 from gfimu.recording.evidence.explanation import explanations
 from gfimu.recording.evidence.gathering import gather
@@ -200,15 +200,12 @@ def _of_samples(recording: Recording, array: AccelerometerArray | None, limits: 
     """Judge the readings, by channel and by chip."""
     names = recording.channels if array is None else array.channels
     readings = recording.readings if array is None else recording.for_array(array)
-    chips: dict[str, list[str]] = {}
-    for name in names:
-        chips.setdefault(name[:-1], []).append(name)
-    floor: Mapping[str, float] = {}
+    floor: Mapping[str, float] = dict.fromkeys(names, SamplePolicy().quietest if recording.unit == "m_s2" else 0.0)
     if limits is not None:
         floor = dict(zip(names, (SamplePolicy().least_noise * limits.noise).tolist(), strict=True))
     unit = "m/s²" if recording.unit == "m_s2" else ""
     columns = dict(zip(names, readings.T, strict=True))
-    return sample_doubts(columns, list(chips.values()), unit=unit, least_noise=floor)
+    return sample_doubts(columns, chips_of(names), unit=unit, least_noise=floor)
 
 
 def _of_gyro(recording: Recording) -> list[Doubt]:

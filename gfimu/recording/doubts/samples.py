@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from gfimu.base.difference_noise import difference_noise
 from gfimu.recording.doubts.doubt import Doubt, rows_in_words
-from gfimu.recording.doubts.rails import rails_of
+from gfimu.recording.doubts.rails import is_within_range, rails_of
 from gfimu.recording.policy import SamplePolicy
 
-__all__ = ["sample_doubts", "sentinels_of", "typical_noise", "wrong_reads"]
+__all__ = ["chips_of", "frozen_rows", "sample_doubts", "sentinels_of", "typical_noise", "wrong_reads"]
 
 _POLICY = SamplePolicy()
 _SENTINELS = (
@@ -82,6 +82,13 @@ def sample_doubts(
         if typical_noise(known) <= floor.get(name, 0.0):
             continue
         alive.append(name)
+        held = frozen_rows(np.where(corrupt, np.nan, values), noise[name])
+        if len(held):
+            text = (
+                f"{name} holds one value for up to {_longest(held)} rows ({rows_in_words(held[:1])} on), although it "
+                "has noise: its chip had stopped, or samples were repeated"
+            )
+            found.append(Doubt("frozen", text, False, (name,), held, is_no_reading=True))
         for rail in rails_of(np.where(corrupt, np.nan, values)):
             count = int(rail.on.sum())
             text = f"{name} reads its rail ({rail.side} {rail.level:.4g}{size}) in {count} samples; set a wider range"
@@ -99,6 +106,14 @@ def sample_doubts(
     return found
 
 
+def chips_of(channels: Sequence[str]) -> list[list[str]]:
+    """Return the channels of each chip, by their names: a11, a12 and a13 are of chip a1."""
+    chips: dict[str, list[str]] = {}
+    for name in channels:
+        chips.setdefault(name[:-1], []).append(name)
+    return list(chips.values())
+
+
 def typical_noise(values: NDArray[np.float64]) -> float:
     """Return the white noise of readings, (n,), by the mean of their second differences, in their unit.
 
@@ -111,6 +126,35 @@ def typical_noise(values: NDArray[np.float64]) -> float:
     return float(np.mean(np.minimum(second, 20.0 * np.mean(second)))) / np.sqrt(
         12.0 / np.pi
     )  # numerical: of white noise
+
+
+def frozen_rows(values: NDArray[np.float64], noise: float) -> NDArray[np.intp]:
+    """Return the rows in which a channel, (n,), repeats the reading before too often for its noise, within its range.
+
+    How often a reading repeats the one before by chance follows from the channel itself, away from these rows.
+    """
+    edges = np.flatnonzero(np.diff(values, prepend=np.nan, append=np.nan) != 0.0)
+    lengths = np.diff(edges)
+    usual = lengths[lengths <= _POLICY.longest_equal]
+    if not len(usual) or len(usual) == len(lengths):
+        return np.empty(0, dtype=np.intp)
+    repeats = 1.0 - len(usual) / float(usual.sum())  # of readings that repeat the one before
+    least = np.log(_POLICY.chance / len(values)) / np.log(max(repeats, _POLICY.least_repeats))
+    step = _step(values)
+    found = []
+    for place in np.flatnonzero(lengths > max(least, _POLICY.longest_equal)):
+        start, stop = int(edges[place]), int(edges[place + 1])
+        beyond = min(np.sum(values > values[start]), np.sum(values < values[start]))
+        is_inside = beyond > max(_POLICY.beyond_pile * (stop - start), _POLICY.garbage)
+        if is_inside or is_within_range(values, start, stop, step, noise):
+            found.append(np.arange(start, stop))
+    return np.concatenate(found) if found else np.empty(0, dtype=np.intp)
+
+
+def _longest(rows: NDArray[np.intp]) -> int:
+    """Return the largest number of rows in a row."""
+    edges = np.flatnonzero(np.diff(rows, prepend=-2, append=rows[-1] + 2) != 1)
+    return int(np.diff(edges).max())
 
 
 def _noisy(noise: Mapping[str, float]) -> Iterator[Doubt]:
@@ -165,7 +209,8 @@ def wrong_reads(
     if wrong.any():
         text = (
             f"{', '.join(names)}: {int(wrong.sum())} single readings are zero or a multiple of those around them "
-            f"({rows_in_words(rows[wrong])}), as where a register is misread; they are left out"
+            f"({rows_in_words(rows[wrong])}), as where a register is misread; results do without them "
+            "(gfimu convert --drop wrong_read)"
         )
         found.append(Doubt("wrong_read", text, False, names, rows[wrong], is_no_reading=True))
     spikes = rows[away.any(axis=1) & seen & ~wrong]

@@ -30,7 +30,7 @@ __all__ = [
 
 _Meta = msgspec.Meta
 
-DropKind = Literal["corrupt", "out_of_range", "missing", "duplicates", "unordered"]
+DropKind = Literal["corrupt", "out_of_range", "missing", "wrong_read", "duplicates", "unordered"]
 """Rows that a map can leave out; see `gfimu.recording.filtered`."""
 
 REFERENCE_KINDS = {

@@ -117,7 +117,7 @@ def gyro_part(
         alike = force if force is not None and len(force) == len(values) else None
         tried.append((table, triad, unit_of_rate(values, triad.columns[0], alike, rate_hz)))
     # Without names that show a rate, the one is the gyro by which gravity turns.
-    table, triad, unit = max(tried, key=lambda one: (one[1].by_name, one[2].is_gravity))
+    table, triad, unit = max(tried, key=lambda one: (one[1].by_name, one[2].agreement))
     elsewhere = "" if table is chosen else table.name
     columns = {
         key: msgspec.structs.replace(_spec(name, unit, 0), table=elsewhere)
@@ -144,7 +144,9 @@ def other_references(table: RawTable, taken: Collection[str]) -> Part:
     reasons = []
     for name in table.columns:
         known = known_reference(name)
-        if known is None or name in taken or known[0] in found or not varies(table.columns[name]):
+        if known is None or name in taken or known[0] in found or table.columns[name].dtype == object:
+            continue
+        if known[0] != "temperature_degC" and not varies(table.columns[name]):
             continue
         key, unit = known
         found[key] = ColumnSpec(name, unit)

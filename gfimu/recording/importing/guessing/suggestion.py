@@ -233,10 +233,10 @@ def _without(raw: RawFile, missing: Collection[float]) -> RawFile:
 def _most_promising(raw: RawFile) -> RawTable:
     """Return the table with the most triads of accelerations that show gravity, the longest of those."""
 
-    def worth(table: RawTable) -> tuple[int, int, int]:
-        forces = [one.columns for one in find_triads(table) if one.kind == "acceleration"]
-        gravity = sum(unit_of_acceleration(table, force).is_gravity for force in forces)
-        return gravity, len(forces), len(table)
+    def worth(table: RawTable) -> tuple[int, int, int, int]:
+        forces = [one for one in find_triads(table) if one.kind == "acceleration"]
+        raw = sum(one.shows_gravity and not one.is_processed for one in forces)
+        return raw, sum(one.shows_gravity for one in forces), len(forces), len(table)
 
     return max(raw.tables.values(), key=worth)
 
@@ -261,7 +261,7 @@ def _alike(other: RawTable, chosen: RawTable, chips: list[tuple[RawTable, Triad]
     return [
         (other, one)
         for one in find_triads(other)
-        if one.kind == "acceleration" and one.columns in names and unit_of_acceleration(other, one.columns).is_gravity
+        if one.kind == "acceleration" and one.columns in names and one.shows_gravity and not one.is_processed
     ]
 
 

@@ -156,13 +156,14 @@ def _known(table: RawTable, name: str) -> NDArray[np.float64]:
 def _without_names(table: RawTable, names: Sequence[str]) -> list[Triad]:
     """Return threes of neighbours, begun so that gravity is the length of as many as can be.
 
-    Gravity that lies along one axis is the length of any three with that axis. So a beginning that leaves no column
-    over at the start goes before others, and what stands between triads of gravity is grouped only then anew.
+    Gravity that lies along one axis is the length of any three with that axis. So of ways with as many the one that
+    begins first is taken, and of these the one that leaves no column over at the start.
     """
     ways = [_threes(table, names[:first]) + _threes(table, names[first:]) for first in range(3)]
     ways.append(_one_by_one(table, names))
-    gravity = [sum(one.shows_gravity for one in way) for way in ways]
-    return ways[gravity.index(max(gravity))]
+    gravity = [[names.index(one.columns[0]) for one in way if one.shows_gravity] for way in ways]
+    best = max(gravity, key=lambda places: (len(places), -places[0] if places else 0))
+    return ways[gravity.index(best)]
 
 
 def _runs(table: RawTable, names: Collection[str]) -> list[list[str]]:
@@ -281,7 +282,8 @@ def _evidence_of_names(words: str, table: str, unit: str) -> tuple[dict[str, flo
         add("acceleration", _POLICY.letter)
     if not found and WEAK_RATE.search(words):
         add("rate", _POLICY.letter)
-    return found, bool(PROCESSED.search(words) or (not words and PROCESSED.search(table)))
+    is_named = any(mark.search(words) for mark in (RATE, OTHER, ACCELERATION))
+    return found, bool(PROCESSED.search(words if is_named else f"{words} {table}"))
 
 
 def _evidence_of_numbers(table: RawTable, columns: tuple[str, str, str]) -> tuple[dict[str, float], TriadUnit | None]:

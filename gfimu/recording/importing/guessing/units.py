@@ -55,8 +55,9 @@ class TriadUnit:
     sure : bool
         Whether the data leave no other reading.
     is_gravity : bool
-        Whether gravity at rest is that of a usual unit, a usual number of counts, or of a sphere of poses; of rates,
-        whether gravity turns by them.
+        Whether gravity at rest is that of a usual unit, a usual number of counts, or of a sphere of poses.
+    agreement : float
+        Of rates: correlation of what gravity turns by with what they would turn it by; 0 where that is not known.
     """
 
     unit: str
@@ -65,6 +66,7 @@ class TriadUnit:
     why: str
     sure: bool
     is_gravity: bool = True
+    agreement: float = 0.0
 
 
 def triad_values(table: RawTable, columns: Sequence[str]) -> NDArray[np.float64]:
@@ -118,7 +120,7 @@ def unit_of_acceleration(table: RawTable, columns: Sequence[str]) -> TriadUnit:
             return TriadUnit("g", 1.0 / radius, offset, why, True)
     if _LOW_COUNTS < length < math.inf:
         power = 2.0 ** round(math.log2(length))
-        if abs(length / power - 1.0) < NEAR:
+        if abs(length / power - 1.0) < NEAR and _are_whole(values):
             why = f"at rest its length is {length:.5g}: {power:g} counts per g"
             return TriadUnit("g", 1.0 / power, zero, why, True)
         why = f"at rest its length is {length:.5g}, taken as 1 g; the data sheet has the exact scale"
@@ -130,10 +132,8 @@ def unit_of_acceleration(table: RawTable, columns: Sequence[str]) -> TriadUnit:
 
 def _usual_unit(values: NDArray[np.float64], length: float) -> TriadUnit | None:
     """Return the usual unit in which gravity comes nearest to a length at rest, with the others that are as likely."""
-    known = values[np.isfinite(values)]
-    whole = bool(np.all(known == np.round(known)))
     readings = {name: STANDARD_GRAVITY / factor for name, factor in _GRAVITY.items()}
-    if whole:
+    if _are_whole(values):
         readings["1024 counts per g"] = 1024.0
     off = {name: abs(length / one - 1.0) for name, one in readings.items()}
     near = [name for name, distance in off.items() if distance < NEAR]
@@ -149,6 +149,12 @@ def _usual_unit(values: NDArray[np.float64], length: float) -> TriadUnit | None:
     )
     why += f"; {' or '.join(others)} is possible" if others else ""
     return TriadUnit(unit, scale, (0.0, 0.0, 0.0), why, not others)
+
+
+def _are_whole(values: NDArray[np.float64]) -> bool:
+    """Whether all readings are whole numbers, as counts are."""
+    known = values[np.isfinite(values)]
+    return bool(np.all(known == np.round(known)))
 
 
 def sphere_of(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], float] | None:
@@ -184,15 +190,16 @@ def unit_of_rate(
         Sample rate of both, where it is known.
     """
     zero = (0.0, 0.0, 0.0)
-    turn = None if forces is None or rate_hz is None else _turn_of_gravity(rates, forces, rate_hz)
+    turned = None if forces is None or rate_hz is None else _turn_of_gravity(rates, forces, rate_hz)
+    turn, agreement = turned or (None, 0.0)
     unit = unit_of_name(name)[1]
     if unit:
         if turn is None or abs(turn / factor_of(unit, "rate") - 1.0) < 0.5:
-            return TriadUnit(unit, 1.0, zero, f"the name has {unit}", True)
+            return TriadUnit(unit, 1.0, zero, f"the name has {unit}", True, agreement=agreement)
         words = min(_SCALES.items(), key=lambda one: abs(_log_ratio(one[0], turn)))[1]
         ratio = turn / factor_of(unit, "rate")
         why = f"the name has {unit}, but by the turn of gravity they are {ratio:.2g} times that, nearest to {words}"
-        return TriadUnit(unit, 1.0, zero, why, False)
+        return TriadUnit(unit, 1.0, zero, why, False, agreement=agreement)
     if turn is not None:
         (unit, scale), words = min(_SCALES.items(), key=lambda one: abs(_log_ratio(one[0], turn)))
         ratio = math.exp(_log_ratio((unit, scale), turn))
@@ -203,24 +210,27 @@ def unit_of_rate(
         ]
         why = f"gravity turns as these rates do in {words} (ratio {ratio:.3f})"
         why += f"; {' or '.join(others)} is as likely" if others else ""
-        return TriadUnit(unit, scale, zero, why, not others and abs(ratio - 1.0) < _NEAR_SCALE)
+        sure = not others and abs(ratio - 1.0) < _NEAR_SCALE
+        return TriadUnit(unit, scale, zero, why, sure, agreement=agreement)
     largest = float(np.nanmax(np.abs(rates)))
     if largest > 2500.0:
         why = f"up to {largest:.4g}: counts; 16.4 per °/s (±2000 °/s) is a guess, the data sheet has the scale"
-        return TriadUnit("deg/s", 1.0 / 16.4, zero, why, False, False)
+        return TriadUnit("deg/s", 1.0 / 16.4, zero, why, False)
     if largest > _FASTEST_RAD_S:
-        whole = bool(np.all(rates[np.isfinite(rates)] == np.round(rates[np.isfinite(rates)])))
+        whole = _are_whole(rates)
         why = f"up to {largest:.4g}: too fast for rad/s" + ("; deg/s, or counts" if whole else "")
-        return TriadUnit("deg/s", 1.0, zero, why, not whole, False)
-    return TriadUnit("rad/s", 1.0, zero, f"up to {largest:.4g}: rad/s, or slow motion in deg/s", False, False)
+        return TriadUnit("deg/s", 1.0, zero, why, not whole)
+    return TriadUnit("rad/s", 1.0, zero, f"up to {largest:.4g}: rad/s, or slow motion in deg/s", False)
 
 
 def _log_ratio(scale: tuple[str, float], turn: float) -> float:
     return math.log(turn / (factor_of(scale[0], "rate") * scale[1]))
 
 
-def _turn_of_gravity(rates: NDArray[np.float64], forces: NDArray[np.float64], rate_hz: float) -> float | None:
-    """Return what one step of a gyro's numbers is, rad/s, from how gravity turns in the body: ḟ = −ω × f.
+def _turn_of_gravity(
+    rates: NDArray[np.float64], forces: NDArray[np.float64], rate_hz: float
+) -> tuple[float, float] | None:
+    """Return what one step of a gyro's numbers is, rad/s, and the correlation, from how gravity turns: ḟ = −ω × f.
 
     Samples where the specific force is not near gravity do not count. None where the two do not agree: a motion that
     does not turn gravity, or axes that differ.
@@ -248,4 +258,4 @@ def _turn_of_gravity(rates: NDArray[np.float64], forces: NDArray[np.float64], ra
     if power == 0.0 or not left.any():
         return None
     correlation = float(left @ right) / math.sqrt(power * float(left @ left))
-    return float(left @ right) / power if correlation > _LEAST_TURN else None
+    return (float(left @ right) / power, correlation) if correlation > _LEAST_TURN else None
