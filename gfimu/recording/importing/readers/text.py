@@ -32,6 +32,7 @@ _NO_NUMBER = ["", "nan", "-nan", "+nan", "na", "n/a", "null", "none", "-"]
 _INFINITE = r"^[+-]?inf(inity)?$"
 _IS_NUMBERS = 0.5  # of the filled cells of a column
 _MOST_PREAMBLE = 100  # numerical: lines
+_LONGEST_STATED = 1000  # numerical: characters of a line that states something
 _HEAD_LINES = 600  # by which the layout is found, and the preamble
 _LAST = 4000  # numerical: characters in which lines after the numbers are looked for
 _MOST_SERIES = 64  # numerical: lines of a file that may have a column per line, as columns of a matrix
@@ -92,7 +93,7 @@ def table_of_text(data: bytes, source: str, text: TextSpec = TextSpec(), limit: 
         columns[name] = values
         if unreadable:
             notes.append(f"{source}: column {name}: {unreadable} cells are no numbers and count as missing")
-    stated = [*_preamble(lines, layout), *stated]
+    stated = [line[:_LONGEST_STATED] for line in (*_preamble(lines, layout), *stated)]
     notes += [f"{source}: states {lost[0]!r}, so samples were lost" for line in stated if (lost := _LOST.search(line))]
     return RawTable("", columns, tuple(notes), layout.named, tuple(stated))
 
