@@ -121,12 +121,12 @@ def estimate(
     """
     chosen = rate_method(method)
     found = refuse_or_warn(doubts_of(recording, array) if findings is None else findings, force=force)
-    # The watch of the recursive methods finds frozen channels by itself, and reports when.
-    used_as = {"frozen"} if chosen.recursive else set()
-    found = tuple(one for one in found if one.kind not in used_as)
-    recording = without_doubtful(recording, array, [one for one in found if one.kind != "clipped"])
+    # The watch of the recursive methods finds frozen channels by itself; without one the others may diverge.
+    found = tuple(one for one in found if one.kind != "frozen" or not chosen.recursive)
+    known = [one for one in found if one.kind != "frozen"]
+    recording = without_doubtful(recording, array, [one for one in known if one.kind != "clipped"])
     missing = np.isnan(recording.for_array(array))  # (n, c)
-    recording = without_doubtful(recording, array, found)
+    recording = without_doubtful(recording, array, known)
     readings = recording.for_array(array)
     saturated = np.isnan(readings) & ~missing
     rate0 = None if omega0 is None else np.asarray(omega0, dtype=float)

@@ -33,8 +33,8 @@ _LOOKED_AT = 50  # texts
 _MOST_PARTS = 8  # restarts of a logger: what goes back more often is no time
 _ROUND_RATE = 2e-3  # relative, by which a rate found from rounded times is taken for a whole number
 _SAID_RATE = re.compile(
-    r"(?<!baud )(?<!bit )(?<!heart )(?:sampl\w*|output|update|data|logging|acq\w*)?[ _-]*(?:\brate|rate\b|freq\w*)"
-    r"|\bodr\b|\bfs\b",
+    r"(?:(?:sampl[a-z]{0,4}|output|update|data|logging|acq[a-z]{0,12})[_ -]{0,3}"
+    r"|(?<![a-z])(?<!baud )(?<!bit )(?<!heart ))(?:rate|freq[a-z]{0,8})(?![a-z])|(?<![a-z])(?:odr|fs)(?![a-z])",
     re.IGNORECASE,
 )
 _SAID_PERIOD = re.compile(
@@ -42,6 +42,7 @@ _SAID_PERIOD = re.compile(
     r"\s*(?P<after>[mun]?s(?:ec\w*)?\b)?",
     re.IGNORECASE,
 )
+_LONGEST_STATED = 1000  # numerical: characters of a line that states a rate
 _NUMBER = re.compile(r"(?<![\w.])(\d+(?:[.,]\d+)?)\s*(k?hz)?", re.IGNORECASE)
 _HERTZ = re.compile(r"(\d+(?:[.,]\d+)?)\s*(k?)(?:hz|sps)\b", re.IGNORECASE)
 
@@ -91,7 +92,7 @@ def find_time(table: RawTable) -> TimeGuess:
 def stated_rate(table: RawTable) -> tuple[float, str] | None:
     """Return the sample rate that the lines before the samples state, Hz, and the words; None without one."""
     rates: dict[float, str] = {}
-    for line in table.preamble:
+    for line in (line[:_LONGEST_STATED] for line in table.preamble):
         for said in _SAID_RATE.finditer(line):
             number = _NUMBER.search(line, said.end())
             if number is None or number.start() - said.end() > 12:

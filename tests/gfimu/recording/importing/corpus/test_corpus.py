@@ -14,10 +14,7 @@ LEAST_RIGHT, MOST_SILENT = 0.90, 0.02  # shares of the shapes
 RANK = ("silent", "marked", "right")
 LESS = {
     "zephyr_lis2dh": "marked",  # "x 0.010 , y 0.2": a word and a number without a mark between, behind a "#"
-    "hdf5_groups": "marked",  # "sample_rate_hz: 104" states no rate
     "motionsense": "marked",  # the gravity that a filter estimates is a chip where there is no other
-    "sensor_logger_zip": "silent",  # so it is beside another one, in a table of its own
-    "kitti_oxts": "silent",  # latitude, longitude and altitude, nearly constant, are a chip
 }
 """Shapes that are not read right: at least so."""
 
