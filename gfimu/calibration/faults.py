@@ -32,7 +32,7 @@ _COMMON_SCALE = 0.01
 class PosePolicy:
     """When the samples of a stretch of rest are those of several poses; how many repeated ones a warning names."""
 
-    unlike: float = 0.05  # of gravity: scatter beyond the noise of any sample at rest
+    unlike: float = 0.3  # of gravity: scatter in all directions, beyond the noise of any sample at rest
     turned: float = 0.02  # of gravity: scatter along one direction, beyond that of coarse counts
     turned_ratio: float = 3.0  # of that scatter over the least one across it; noise of axes differs by less than twice
     named_groups: int = 6
@@ -146,7 +146,7 @@ def without_moved_poses(recording: Recording, rest: Rest) -> tuple[Rest, tuple[s
     kept = np.setdiff1d(np.arange(len(rest)), moved)
     if not len(kept):
         raise InputError(
-            f"the samples of all {len(rest)} stretches of rest differ as those of several poses do (0.05 g and more); "
+            f"the samples of all {len(rest)} stretches of rest differ as those of several poses do; "
             "hold each pose still, or, where every row is a pose, add --rows poses"
         )
     text = f"poses that moved while recorded, left out: {places}"
