@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from gfimu.calibration.multi_position import multi_position_gyro
     from gfimu.calibration.observations import Observations, averaged_poses, every_sample
     from gfimu.calibration.registry import METHODS, calibration_method
-    from gfimu.calibration.run_file import open_uncalibrated
+    from gfimu.calibration.run_file import open_poses, open_uncalibrated
     from gfimu.calibration.spin import SpinPolicy
 else:
     __getattr__, __dir__, __all__ = declared_names(__name__)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,9 +26,19 @@ _STUCK_SHARE = 0.01
 _MOVED_SHARE = 5e-4
 _MOVED_SIGMA = 8.0
 _COMMON_SCALE = 0.01
-_NAMED_GROUPS = 6  # of poses that repeat each other, in a warning
-_UNLIKE_SHARE = 0.05  # of gravity: scatter beyond the noise of any sample at rest
-_TURNED_SHARE, _TURNED_RATIO = 0.02, 3.0  # of gravity, beyond coarse counts; of the scatter across it
+
+
+@dataclass(frozen=True)
+class PosePolicy:
+    """When the samples of a stretch of rest are those of several poses; how many repeated ones a warning names."""
+
+    unlike: float = 0.3  # of gravity: scatter in all directions, beyond the noise of any sample at rest
+    turned: float = 0.02  # of gravity: scatter along one direction, beyond that of coarse counts
+    turned_ratio: float = 3.0  # of that scatter over the least one across it; noise of axes differs by less than twice
+    named_groups: int = 6
+
+
+_POLICY = PosePolicy()
 
 
 def check_gravity(gravity: float) -> tuple[str, ...]:
@@ -117,8 +127,8 @@ def _is_unlike(part: Floats, recording: Recording) -> bool:
         return False
     counts = float(np.nanmedian(np.linalg.norm(recording.readings[:, :3], axis=1)))
     shares = np.linalg.eigvalsh(np.cov(samples.T)) / (STANDARD_GRAVITY if recording.unit == "m_s2" else counts) ** 2
-    turned = shares[2] > _TURNED_SHARE**2 and shares[2] > _TURNED_RATIO**2 * shares[0]
-    return bool(turned or shares[2] > _UNLIKE_SHARE**2)
+    turned = shares[2] > _POLICY.turned**2 and shares[2] > _POLICY.turned_ratio**2 * shares[0]
+    return bool(turned or shares[2] > _POLICY.unlike**2)
 
 
 def without_moved_poses(recording: Recording, rest: Rest) -> tuple[Rest, tuple[str, ...]]:
@@ -136,7 +146,7 @@ def without_moved_poses(recording: Recording, rest: Rest) -> tuple[Rest, tuple[s
     kept = np.setdiff1d(np.arange(len(rest)), moved)
     if not len(kept):
         raise InputError(
-            f"the samples of all {len(rest)} stretches of rest differ as those of several poses do (0.05 g and more); "
+            f"the samples of all {len(rest)} stretches of rest differ as those of several poses do; "
             "hold each pose still, or, where every row is a pose, add --rows poses"
         )
     text = f"poses that moved while recorded, left out: {places}"
@@ -151,9 +161,9 @@ def repeated_poses(means: Floats) -> tuple[str, ...]:
         return ()
     names = "; ".join(
         f"{', '.join(str(number + 1) for number in group)} ({pose_label(directions[group[0]])})"
-        for group in groups[:_NAMED_GROUPS]
+        for group in groups[: _POLICY.named_groups]
     )
-    names += f" and {len(groups) - _NAMED_GROUPS} groups more" if len(groups) > _NAMED_GROUPS else ""
+    names += f" and {len(groups) - _POLICY.named_groups} groups more" if len(groups) > _POLICY.named_groups else ""
     return (f"poses that repeat each other: {names}; they add weight but no coverage",)
 
 

@@ -15,7 +15,7 @@ from gfimu.base.errors import InputError
 from gfimu.base.files.input_file import as_path
 from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.calibration.coverage import fit_sphere
-from gfimu.calibration.poses import UNTIMED, is_pose_table
+from gfimu.calibration.poses import UNTIMED, TablePolicy, is_pose_table
 from gfimu.recording import Recording
 from gfimu.recording.importing.guessing.units import NEAR
 from gfimu.recording.reading import read_bytes
@@ -23,7 +23,6 @@ from gfimu.recording.reading import read_bytes
 __all__ = ["read_text_triad"]
 
 _LONGEST_REASON = 160
-_FEWEST_POSES = 4  # that a sphere goes through
 _GRAVITY = {1.0: STANDARD_GRAVITY, STANDARD_GRAVITY: 1.0}  # length in g and in m/s², and what makes it m/s²
 
 
@@ -57,12 +56,12 @@ def read_text_triad(path: str | Path) -> Recording:
     except (ValueError, UnicodeDecodeError) as error:
         reason = " ".join(str(error).split())[:_LONGEST_REASON]
         raise InputError(f"{file}: not rows of four numbers ({reason}); columns are time, x, y, z") from None
-    if table.shape[1] % 3 == 0 and len(table) >= _FEWEST_POSES:
+    if table.shape[1] % 3 == 0 and len(table) >= TablePolicy.fewest:
         return _pose_rows(np.arange(len(table), dtype=float), table, {"source": file.name, UNTIMED: True})
     if table.shape[1] % 3 != 1 or table.shape[1] < 4 or len(table) < 2:
         raise InputError(
-            f"{file}: {table.shape[0]} rows of {table.shape[1]} columns; needed: time, x, y, z, or {_FEWEST_POSES} or "
-            "more poses x, y, z"
+            f"{file}: {table.shape[0]} rows of {table.shape[1]} columns; needed: time, x, y, z, or "
+            f"{TablePolicy.fewest} or more poses x, y, z"
         )
     backwards = np.diff(table[:, 0]) <= 0
     if backwards.any() or not np.isfinite(table).all():

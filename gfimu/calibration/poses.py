@@ -28,7 +28,17 @@ from gfimu.calibration.result import Calibration
 from gfimu.recording import Recording
 from gfimu.recording.rest import Rest, detect_rest
 
-__all__ = ["ROWS", "UNTIMED", "PosesFound", "find_poses", "is_pose_table", "pose_rests", "table_fit", "table_poses"]
+__all__ = [
+    "ROWS",
+    "UNTIMED",
+    "PosesFound",
+    "TablePolicy",
+    "find_poses",
+    "is_pose_table",
+    "pose_rests",
+    "table_fit",
+    "table_poses",
+]
 
 ROWS = ("auto", "poses", "samples")
 """What the rows of a recording are: judged by the data, one pose each, or samples of a series."""
@@ -41,6 +51,7 @@ UNTIMED = "untimed_rows"
 class TablePolicy:
     """When rows are poses."""
 
+    fewest: int = 4  # rows: a sphere goes through any four
     jump: float = 0.05  # of gravity, between half the neighbouring rows: 3° of tilt, beyond the noise of any sample
     round: float = 0.1  # of gravity, rms distance from a sphere: gains within 10 %; a motion adds its own force
     contradiction: float = 1e-3  # probability of a misfit at which a stated noise is scaled up

@@ -7,8 +7,7 @@ import pytest
 from calibration_cases import FACES, GRAVITY, MULTI, calibrate, chips_in_gauge, poses_of
 
 from gfimu import AccelerometerArray, InputError
-from gfimu.calibration import ErrorModel
-from gfimu.calibration.run_file import open_poses
+from gfimu.calibration import ErrorModel, open_poses
 from gfimu.recording import Recording
 
 MODEL = ErrorModel(np.array([[0.98, 0, 0], [0.01, 1.02, 0], [-0.01, -0.015, 0.965]]), np.array([0.21, -0.39, 0.44]))
