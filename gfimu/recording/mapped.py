@@ -131,8 +131,8 @@ def mapped_recording(
 
 def mapped_reference(
     path: str | Path, column_map: ColumnMap
-) -> tuple[NDArray[np.float64], dict[str, NDArray[np.float64]], float]:
-    """Read the references alone of a foreign file by a map of its columns.
+) -> tuple[NDArray[np.float64], dict[str, NDArray[np.float64]], float, dict[str, NDArray[np.float64]]]:
+    """Read the references, and the channels if it has any, of a foreign file by a map of its columns.
 
     Returns
     -------
@@ -142,20 +142,22 @@ def mapped_reference(
         References by their name, SI.
     origin_s : float
         Time on the file's clock at which ``t_s`` is zero, s.
+    channels : dict of str to ndarray, shape (m,)
+        Channels by their name, m/s².
 
     Raises
     ------
     InputError
-        As `mapped_recording`; also if the map names no reference that the file has.
+        As `mapped_recording`; also if the map names no reference and no channel that the file has.
     """
     piece = _between(piece_of(read_foreign(path, column_map.format, column_map.text), column_map), column_map)
-    if not piece.reference:
+    if not piece.reference and not piece.channels:
         raise InputError(
             f"{path}: map {column_map.name!r} gives no reference; add one under [reference], as tacho_rad_s"
         )
     for note in piece.times.notes:
         warn(note)
-    return piece.times.t_s, dict(piece.reference), piece.times.origin_s
+    return piece.times.t_s, dict(piece.reference), piece.times.origin_s, dict(piece.channels)
 
 
 def _between(piece: Piece, chosen: ColumnMap) -> Piece:

@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.linalg import null_space
 
-from gfimu.recording.joining.alignment import align
-from gfimu.recording.joining.join import FAR, Joined, grids, join_reference
+from gfimu.recording.joining.join import FAR, Joined, aligned, join_reference
 from gfimu.recording.joining.reference_file import ReferenceSeries
 from gfimu.recording.recording import Recording
 
@@ -39,12 +38,9 @@ def displaced_reference(recording: Recording, *, rates: bool = False) -> Joined 
     if known.sum() < _FEWEST or not usable.any() or recording.unit != "m_s2":
         return None
     series = ReferenceSeries("the reference", recording.t_s[known], {name: one[known] for name, one in columns.items()})
-    rate = series.rate()[1]
-    if len(rate) < _FEWEST or np.ptp(rate) == 0.0:
-        return None
     seen = _without_hub(recording) if rates else recording
-    rough = align(grids(seen, series), most_rate_error=0.0, refine=False)
-    if rough is None or (abs(rough.offset) <= FAR and not rates):
+    rough = aligned(seen, series)
+    if rough is None or (abs(rough.apart(recording.t_s[0])) <= FAR and not rates):
         return None
     found = join_reference(recording, series, force=True, seen=seen if rates else None)
     is_far = found.is_far or (rates and found.has_rate_error)
