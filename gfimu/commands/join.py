@@ -59,15 +59,19 @@ def join(
     from gfimu.recording.joining import ReferenceSeries, join_reference, open_reference
 
     drawing = None if array is None else as_array(array)
-    source = as_source(channels, array, column_map, max_memory=max_memory)
-    recording = open_recording(source, array=drawing)
-    examine(recording, drawing, source=name_of(channels), force=force)
-    if drawing is not None:
-        recording = recording.carrying(drawing)
     if not isinstance(reference, ReferenceSeries):
-        mapped = None if reference_map is None else load_map(reference_map)
-        reference = open_reference(with_memory(reference, max_memory), mapped)
+        reference = open_reference(
+            with_memory(reference, max_memory), reference_map and load_map(reference_map), column_map and load_map(column_map)
+        )
+    whole = drawing if not reference.channels else None  # of two loggers each has a part of the array
+    source = as_source(channels, whole, column_map, max_memory=max_memory)
+    recording = open_recording(source, array=whole)
+    examine(recording, whole, source=name_of(channels), force=force)
+    if whole is not None:
+        recording = recording.carrying(whole)
     joined = join_reference(recording, reference, most_rate_error=most_rate_error, force=force)
+    if drawing is not None and whole is None:
+        joined = joined.carrying(drawing)
     if out is not None:
         joined.recording.write(out)
     return joined

@@ -4,9 +4,9 @@ Of a tachometer or an encoder: ω², α and gravity at the table's angle θ, cos
 of ω, α, and gravity in axes that turn by the integral of ω; the gyro's drift turns these axes slowly, so gravity there
 is quadratic in time. Of a logger: its accelerations, its gyro's rates, their products and α.
 
-Each column of a reference goes through a smoothing spline first, whose penalty generalised cross-validation chooses
-(D. Garcia, Computational Statistics & Data Analysis 54, 2010). So noise does not make the functions' coefficients
-small, and a function has a derivative.
+Each column of a reference is smoothed first, by the cosine transform of a smoothing spline (D. Garcia, Computational
+Statistics & Data Analysis 54, 2010), whose penalty generalised cross-validation chooses; of an angle, its differences
+are. So noise does not make the functions' coefficients small.
 """
 
 from __future__ import annotations
@@ -58,11 +58,16 @@ class Basis:
     @classmethod
     def of_table(cls, t: NDArray[np.float64], values: NDArray[np.float64], *, is_angle: bool) -> Basis:
         """Return the functions of a table's rate (m,), rad/s, or of its angle, rad."""
+        if is_angle:
+            t, values = 0.5 * (t[1:] + t[:-1]), np.diff(values) / np.diff(t)
         u, smooth, noise = smoothed(t, values[:, None])
-        angle = CubicSpline(u, smooth[:, 0]) if is_angle else CubicSpline(u, smooth[:, 0]).antiderivative()
+        angle = CubicSpline(u, smooth[:, 0]).antiderivative()
         functions = np.column_stack([angle(u, 1) ** 2, angle(u, 2)])
         walk = 0.0 if is_angle else float(noise[0]) * float(u[1] - u[0]) ** 0.5
-        return cls(CubicSpline(u, np.column_stack([functions, angle(u)])), True, walk, functions, u)
+        wave = np.column_stack([np.cos(angle(u)), np.sin(angle(u))])
+        slow = _correlation_time(wave, u) > 0.5 * _correlation_time(functions, u)  # else its phase is lost on a grid
+        searched = np.column_stack([functions, wave]) if slow else functions
+        return cls(CubicSpline(u, np.column_stack([functions, angle(u)])), True, walk, searched, u)
 
     @classmethod
     def of_body(cls, t: NDArray[np.float64], gyro: NDArray[np.float64] | None,
@@ -91,11 +96,8 @@ class Basis:
 
     @property
     def width(self) -> float:
-        """Correlation time of what is searched, s: the inverse of its rms frequency, the fastest of them."""
-        slope = np.gradient(self.searched, self.times, axis=0)
-        spread = np.maximum(self.searched.std(axis=0), 1e-12)
-        weighty = spread > _WEIGHTY * spread.max()
-        return float(1.0 / max(np.max((slope.std(axis=0) / spread)[weighty]), 1e-3))
+        """Correlation time of what is searched, s."""
+        return _correlation_time(self.searched, self.times)
 
     @property
     def step(self) -> float:
@@ -187,7 +189,7 @@ class Readings:
 def smoothed(
     t: NDArray[np.float64], values: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Return uniform times (m,), s, smooth values (m, c) at them, and the noise of a value (c,)."""
+    """Return uniform times (m,), s, smooth values (m, c) at them, and their noise (c,)."""
     step = max(float(np.median(np.diff(t))), float(t[-1] - t[0]) / _MOST_ROWS)
     u = t[0] + step * np.arange(int((t[-1] - t[0]) / step) + 1)
     place = np.clip(np.round((t - t[0]) / step).astype(int), 0, len(u) - 1)
@@ -199,12 +201,14 @@ def smoothed(
     lines = np.column_stack([np.interp(u, means[0], one) for one in means[1:]])
     grid[gap] = lines[gap]
     line = np.linspace(grid[0], grid[-1], len(u))  # so that the ends, which the transform mirrors, have no step
-    power = dctn(grid - line, axes=[0], norm="ortho")
-    shape = 1.0 / (1.0 + _PENALTIES[:, None] * (2.0 - 2.0 * np.cos(np.pi * np.arange(len(u)) / len(u))) ** 2)
-    missed = ((1.0 - shape) ** 2) @ power**2 / len(u)  # (penalties, c)
-    score = missed / (1.0 - shape.mean(axis=1))[:, None] ** 2
-    best = np.argmin(score, axis=0)
-    return u, line + idctn(power * shape[best].T, axes=[0], norm="ortho"), np.sqrt(score.min(axis=0) * (1.0 - shape.mean(axis=1)[best]))
+    waves = dctn(grid - line, axes=[0], norm="ortho")
+    squared = 2.0 - 2.0 * np.cos(np.pi * np.arange(len(u)) / len(u))  # frequencies, of differences
+    shape = 1.0 / (1.0 + _PENALTIES[:, None] * squared**2)  # (penalties, m)
+    freedom = (1.0 - shape).sum(axis=1)[:, None]
+    missed = (1.0 - shape) ** 2 @ waves**2  # (penalties, c)
+    best = np.argmin(missed / freedom**2, axis=0)
+    noise = np.sqrt((missed / freedom)[best, np.arange(len(best))])
+    return u, line + idctn(waves * shape[best].T, axes=[0], norm="ortho"), noise
 
 
 def by_chip(values: NDArray[np.float64], names: Sequence[str]) -> NDArray[np.float64]:
@@ -212,6 +216,13 @@ def by_chip(values: NDArray[np.float64], names: Sequence[str]) -> NDArray[np.flo
     chips = list(dict.fromkeys(name[:-1] for name in names))
     places = [[index for index, name in enumerate(names) if name[:-1] == chip] for chip in chips]
     return np.column_stack([np.linalg.norm(values[:, one], axis=1) for one in places])
+
+
+def _correlation_time(values: NDArray[np.float64], t: NDArray[np.float64]) -> float:
+    """Return the correlation time of series (m, c), s: the inverse of its rms frequency, the fastest of them."""
+    spread = np.maximum(values.std(axis=0), 1e-12)
+    slope = np.gradient(values, t, axis=0).std(axis=0)
+    return float(1.0 / max(np.max((slope / spread)[spread > _WEIGHTY * spread.max()]), 1e-3))
 
 
 def _attitude(rate: NDArray[np.float64], step: float) -> NDArray[np.float64]:

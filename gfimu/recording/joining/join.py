@@ -9,14 +9,14 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gfimu.array.array import AccelerometerArray
 from gfimu.base.declared import Declared, Table, figure
 from gfimu.base.errors import InputError
 from gfimu.base.results import Panel, PlottedResult, Series, text_column
 from gfimu.recording.importing.piece import at_times, chip_names, nearest_rows
-from gfimu.recording.joining.alignment import Alignment, align
-from gfimu.recording.joining.basis import Readings
-from gfimu.recording.joining.reference_file import ReferenceSeries
-from gfimu.recording.quantities import GYRO_COLUMNS, TIME_COLUMNS
+from gfimu.recording.joining.alignment import Alignment
+from gfimu.recording.joining.series import ReferenceSeries, align_series
+from gfimu.recording.quantities import TIME_COLUMNS
 from gfimu.recording.recording import Recording
 
 __all__ = ["FAR", "Joined", "aligned", "join_reference"]
@@ -109,6 +109,18 @@ class Joined(Declared, PlottedResult):
             "rate_error": found.rate_error,
             "rate_error_std": found.rate_error_std,
         }
+
+    def carrying(self, array: AccelerometerArray) -> Joined:
+        """Return the recordings of two loggers with the array of both, whose channels are in their order."""
+        recordings = [self.recording, self.by_own_rate, self.by_reference_clock]
+        if len(self.recording.channels) != array.n_channels:
+            raise InputError(
+                f"the two loggers have {len(self.recording.channels)} channels, array {array.name!r} has "
+                f"{array.n_channels}; give the array that holds the chips of both"
+            )
+        names = self.recording.channels if set(self.recording.channels) == set(array.channels) else array.channels
+        carried = [replace(one, channels=names).carrying(array) for one in recordings]
+        return replace(self, recording=carried[0], by_own_rate=carried[1], by_reference_clock=carried[2])
 
     def to_columns(self) -> dict[str, NDArray[Any]]:
         """Return one row per channel: the share of its variance that the reference explains."""
@@ -207,12 +219,9 @@ def aligned(
         raise InputError(f"largest rate error {most_rate_error}: give a ratio of 0 to {_MOST_RATE_ERROR:g}")
     if len(recording) < 16:
         raise InputError("a recording of fewer than sixteen samples can't be aligned; record longer")
-    basis, values, names = reference.basis(), recording.readings, list(recording.channels)
-    if reference.channels and reference.gyro is not None and set(GYRO_COLUMNS) <= set(recording.reference):
-        values = np.column_stack([values, *(recording.reference[name] for name in GYRO_COLUMNS)])
-        names += ["gyro1", "gyro2", "gyro3"]
-    return align(Readings.of(recording.t_s, values, basis.step, names if reference.channels else ()), basis,
-                 most_rate_error=most_rate_error)
+    channels = dict(zip(recording.channels, recording.readings.T, strict=True))
+    own = ReferenceSeries("the channels", recording.t_s, recording.reference, channels=channels)
+    return align_series(own, reference, most_rate_error=most_rate_error)
 
 
 def _undetermined(found: Alignment, most_rate_error: float) -> str:
