@@ -18,7 +18,7 @@ from scipy.fft import irfft, next_fast_len, rfft
 
 from gfimu.base.declared import Declared, figure
 from gfimu.recording.joining.basis import Basis, Readings
-from gfimu.recording.joining.fit import refined
+from gfimu.recording.joining.fit import Fit, leaning, refined
 
 __all__ = ["Alignment", "align"]
 
@@ -164,15 +164,24 @@ def align(readings: Readings, basis: Basis, *, most_rate_error: float = 0.02) ->
         return None
     width = basis.width
     starts = _candidates(readings, basis, most_rate_error, width)
-    for leaning in (False, True) if basis.is_table else (False,):  # gravity's phase is lost far from the best clocks
-        fits = [refined(readings, basis, *start, most_rate_error, leaning=leaning) for start in starts]
-        fits = sorted(fits, key=lambda one: one.odds_over(0.0), reverse=True)[:_RIVALS]
-        starts = [(one.offset, one.rate_error) for one in fits]
+    fits = [refined(readings, basis, *start, most_rate_error) for start in starts]
     if not fits:
         return None
-    best, others = fits[0].whole(), fits[1:]
-    middle = (best.middle - best.offset) / (1.0 + best.rate_error)
-    apart = [one for one in others if abs(one.offset + (1.0 + one.rate_error) * middle - best.middle) > width]
+    fits = sorted(fits, key=lambda one: one.odds_over(0.0), reverse=True)[:_RIVALS]
+    if basis.is_table:
+        fits = [one for fit in fits for one in leaning(fit, readings)]
+    fits.sort(key=lambda one: one.odds_over(0.0) - one.rarity, reverse=True)
+
+    def is_apart(one: Fit, other: Fit) -> bool:
+        u = (other.middle - other.offset) / (1.0 + other.rate_error)
+        return abs(one.offset + (1.0 + one.rate_error) * u - other.middle) > width
+
+    here = [one.whole() for one in fits if not is_apart(one, fits[0])]
+    best = min((one for one in here if not one.is_analogue), key=lambda one: one.misfit(), default=here[0])
+    for other in here:
+        if other.is_analogue and best is not other:
+            best = best.with_rival(other)
+    apart = [one for one in fits if is_apart(one, best)]
     found = best.estimate()
     return Alignment(
         best.offset, found.std[0], best.rate_error, found.std[1], best.length,

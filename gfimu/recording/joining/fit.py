@@ -18,7 +18,7 @@ from scipy.special import log_ndtr
 
 from gfimu.recording.joining.basis import Basis, Readings
 
-__all__ = ["Estimate", "Fit", "refined"]
+__all__ = ["Estimate", "Fit", "leaning", "refined"]
 
 _BLOCKS = 20  # of the overlap, whose scatter the standard deviations are of
 _LEAST_MOVED = 0.05  # of a block's gradient, that the fit to it leaves
@@ -290,28 +290,39 @@ class Fit:
         others = np.arange(-self.most, self.most, step).tolist()
         return [self, *(self.with_changes({_SHIFT: shift + valley * (one - now), _RATE: one}) for one in others)]
 
+    def other_gains(self) -> list[Fit]:
+        """Return starts with all gains of an analogue tachometer at which gravity has another phase."""
+        count = int(min(3.0 * _GAIN * max(float(np.ptp(self.angle())), 1.0) / _PHASE, _MOST_TRIED)) // 2
+        analogue = replace(self, free=(*self.free, _TACHO))
+        return [analogue.with_changes({_TACHO: one}) for one in np.linspace(-3.0, 3.0, 2 * count + 1) * _GAIN]
+
     def whole(self) -> Fit:
-        """Return the least misfit by all parameters, from the offset and the rate error of this one on."""
+        """Return the least misfit by all parameters that are free and the random walk, from here on."""
         fit = replace(self, free=(*self.free, *range(_OTHERS, len(self.at))))
         for _ in range(2):
             fit = fit.solved().censored().weighted()
-        if not fit.basis.is_table or not fit.basis.walk:
-            return fit
-        count = int(min(3.0 * _GAIN * max(float(np.ptp(fit.angle())), 1.0) / _PHASE, _MOST_TRIED)) // 2
-        gains = np.linspace(-3.0, 3.0, 2 * count + 1) * _GAIN
-        analogue = replace(fit, free=(*self.free, _TACHO))
-        starts = [one.solved() for one in _best([analogue, *(analogue.with_changes({_TACHO: one}) for one in gains)], 2)]
-        other = replace(_best(starts, 1)[0], free=(*self.free, *range(_TACHO, len(self.at)))).solved()
-        gained = fit.misfit() - other.misfit() - _SELDOM - other.occam()
-        if gained > _SURE:
-            return other.censored().weighted()
-        return replace(fit, rival=other.at) if gained > 0.0 else fit
+        return fit
 
-    def occam(self) -> float:
-        """Return how much narrower the tachometer's gain is than its prior, nats."""
+    @property
+    def is_analogue(self) -> bool:
+        """Whether the tachometer's gain is a parameter."""
+        return _TACHO in self.free
+
+    def with_rival(self, other: Fit) -> Fit:
+        """Return this fit, or that of an analogue tachometer in its place; the other is a rival where none is sure."""
+        gained = self.misfit() - replace(other, share=self.share).misfit() - other.rarity
+        if gained > _SURE:
+            return other
+        return replace(self, rival=other.at) if gained > 0.0 else self
+
+    @property
+    def rarity(self) -> float:
+        """Log odds against an analogue tachometer before its data, and how much narrower its gain is now, nats."""
+        if not self.is_analogue:
+            return 0.0
         precision = self.curvature()[1].sum(axis=0) + np.diag(self.prior[list(self.free)])
         place = self.free.index(_TACHO)
-        return float(-0.5 * np.log(np.linalg.pinv(precision)[place, place]) + np.log(_GAIN))
+        return float(_SELDOM - 0.5 * np.log(np.linalg.pinv(precision)[place, place]) + np.log(_GAIN))
 
     def slopes(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the derivatives of the residual at constant coefficients, projected as it is, (p, n, c), and it."""
@@ -401,18 +412,25 @@ class Fit:
         return worst
 
 
-def refined(
-    readings: Readings, basis: Basis, offset: float, rate_error: float, most: float, *, leaning: bool
-) -> Fit:
-    """Return the fit at the least misfit near an offset, s, and a rate error; ``leaning`` as of `Fit`."""
+def refined(readings: Readings, basis: Basis, offset: float, rate_error: float, most: float) -> Fit:
+    """Return the fit at the least misfit near an offset, s, and a rate error, without gravity at a table's angle."""
     for _ in range(2):
         # The overlap is that of the best clocks yet: of a start further off, rows beyond the ends would count.
-        fit = Fit.of(readings, basis, offset, rate_error, most, leaning=leaning)
-        if leaning and basis.is_table:
-            fit = _best([one.solved() for one in _best(fit.other_rates(), _STARTS)], 1)[0]
+        fit = Fit.of(readings, basis, offset, rate_error, most, leaning=not basis.is_table)
         fit = fit.solved().censored().weighted().solved()
         offset, rate_error = fit.offset, fit.rate_error
     return fit
+
+
+def leaning(fit: Fit, readings: Readings) -> list[Fit]:
+    """Return the fits with gravity at a table's angle near one without: of an exact tachometer, and an analogue one."""
+    plain = replace(Fit.of(readings, fit.basis, fit.offset, fit.rate_error, fit.most, leaning=True), share=fit.share)
+    found = []
+    for starts in (plain.other_rates(), plain.other_gains() if fit.basis.walk else []):
+        if starts:
+            [best] = _best([one.solved() for one in _best(starts, _STARTS)], 1)
+            found.append(best.censored().weighted().solved())
+    return found
 
 
 def _best(fits: Sequence[Fit], count: int) -> list[Fit]:

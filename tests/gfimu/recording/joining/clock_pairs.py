@@ -138,6 +138,7 @@ def draw_pair(rng, kind: str | None = None, *, other: bool = False, clip: bool |
     if clip if clip is not None else rng.uniform() < 0.2:
         values = np.clip(values, *np.quantile(values, [0.1, 1.0], axis=0))
     turned = table_rate(rng, profile, t) if other else rate
+    digital = rng.uniform() < 0.8  # it counts by its own clock
     tacho_noise = _log(rng, 0.003, 0.03)
     if kind == "angle":
         measured = np.cumsum(turned)[:, None] / FINE
@@ -145,7 +146,7 @@ def draw_pair(rng, kind: str | None = None, *, other: bool = False, clip: bool |
         columns = {"angle_rad": seen[:, 0]}
     else:
         count = float(rng.choice([0.0, 0.02, 0.1]))
-        theirs, seen = _sampled(rng, t, turned[:, None], _log(rng, 10.0, 200.0), tacho_noise, count, jitter)
+        theirs, seen = _sampled(rng, t, (1.0 + rate_error * digital) * turned[:, None], _log(rng, 10.0, 200.0), tacho_noise, count, jitter)
         columns = {"tacho_rad_s": seen[:, 0]}
     series = ReferenceSeries("reference.csv", (theirs - offset) / (1.0 + rate_error), columns)
     return Pair(kind, Recording(times, values, _names(chips)), series, offset, rate_error)
