@@ -27,7 +27,7 @@ _LEAST_SPREAD = 1e-3  # rad²/s², rad/s² or m/s²: a reference whose functions
 _MOST_RATES = 61  # of the grid of rate errors
 _PER_WIDTH = 8.0  # steps of the search per correlation time of the functions
 _MOST_STEPS = 20_000  # of the search, in both files together
-_CANDIDATES, _RIVALS = 5, 2  # offsets that are refined, with gravity
+_CANDIDATES, _LIKELY = 5, 4  # offsets that are refined, and starts with gravity
 _ODDS = 30.0  # nats, by which the best offset has to beat the next, and drifts
 _LOST = 0.2  # of the variance, on a quarter that the fit did not see
 
@@ -167,10 +167,10 @@ def align(readings: Readings, basis: Basis, *, most_rate_error: float = 0.02) ->
     fits = [refined(readings, basis, *start, most_rate_error) for start in starts]
     if not fits:
         return None
-    fits = sorted(fits, key=lambda one: one.odds_over(0.0), reverse=True)[:_RIVALS]
     if basis.is_table:
-        fits = [one for fit in fits for one in leaning(fit, readings)]
-    fits.sort(key=lambda one: one.odds_over(0.0) - one.rarity, reverse=True)
+        likely = sorted((one for fit in fits for one in leaning(fit, readings)), key=lambda one: -one.odds_over(0.0))
+        fits = [one.settled() for one in likely[:_LIKELY]]
+    fits.sort(key=lambda one: one.rarity - one.odds_over(0.0))
 
     def is_apart(one: Fit, other: Fit) -> bool:
         u = (other.middle - other.offset) / (1.0 + other.rate_error)

@@ -31,7 +31,7 @@ _SURE = 30.0  # nats by which that is decided: with residuals as correlated as h
 _LEAST_WEIGHT = 1e-3  # of a clipped reading, below which it says nothing
 _AT_BOUND = 0.99  # of the largest rate error
 _PHASE = 0.7  # rad between tried rate errors, at the end that is further off
-_MOST_TRIED, _STARTS = 400, 3
+_MOST_TRIED = 400
 _MARGIN, _LONGEST_MARGIN = 0.02, 1.0  # of the overlap, and s, that are left out at its ends
 _ITERATIONS, _HALVINGS = 20, 10
 _SETTLED = 1e-3  # nats that a last step gains
@@ -275,6 +275,10 @@ class Fit:
                 break
         return fit
 
+    def settled(self) -> Fit:
+        """Return the fit at its least misfit, with clipped readings and weights by it."""
+        return self.solved().censored().weighted().solved()
+
     def other_rates(self) -> list[Fit]:
         """Return starts with all rate errors at which gravity has another phase, shifted as the other functions want.
 
@@ -417,25 +421,19 @@ def refined(readings: Readings, basis: Basis, offset: float, rate_error: float, 
     for _ in range(2):
         # The overlap is that of the best clocks yet: of a start further off, rows beyond the ends would count.
         fit = Fit.of(readings, basis, offset, rate_error, most, leaning=not basis.is_table)
-        fit = fit.solved().censored().weighted().solved()
+        fit = fit.settled()
         offset, rate_error = fit.offset, fit.rate_error
     return fit
 
 
 def leaning(fit: Fit, readings: Readings) -> list[Fit]:
-    """Return the fits with gravity at a table's angle near one without: of an exact tachometer, and an analogue one."""
+    """Return starts with gravity at a table's angle near a fit without: of an exact tachometer, and an analogue one."""
     plain = replace(Fit.of(readings, fit.basis, fit.offset, fit.rate_error, fit.most, leaning=True), share=fit.share)
     found = []
     for starts in (plain.other_rates(), plain.other_gains() if fit.basis.walk else []):
         if starts:
-            [best] = _best([one.solved() for one in _best(starts, _STARTS)], 1)
-            found.append(best.censored().weighted().solved())
+            found.append(min(starts, key=lambda one: one.misfit()).weighted())
     return found
-
-
-def _best(fits: Sequence[Fit], count: int) -> list[Fit]:
-    """Return the fits of least misfit, the best first."""
-    return sorted(fits, key=lambda one: one.misfit())[:count]
 
 
 def _scattered(pull: NDArray[np.float64], bend: NDArray[np.float64], prior: NDArray[np.float64]) -> NDArray[np.float64]:
