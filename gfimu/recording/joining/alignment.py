@@ -46,10 +46,9 @@ class Alignment(Declared):
         Of the functions, in the order of the `Basis`.
     coefficient_std : ndarray, shape (k, c)
         Their standard deviations.
-    predicted : float
-        Share of the variance of a quarter of the overlap that coefficients from the others explain, the worst quarter.
-    fitted : float
-        Share of the variance of all channels together that the fit explains.
+    lost : float
+        Share of the variance of a quarter of the overlap that coefficients of its own explain and those of the other
+        quarters don't, in the worst quarter.
     at_bound : bool
         Whether the rate error is at the bound of its search.
     odds_of_motion : float
@@ -114,8 +113,7 @@ class Alignment(Declared):
     independent: NDArray[np.float64]
     coefficients: NDArray[np.float64]
     coefficient_std: NDArray[np.float64]
-    predicted: float
-    fitted: float
+    lost: float
     at_bound: bool
     odds_of_motion: float
     middle_s: float
@@ -136,10 +134,10 @@ class Alignment(Declared):
             )
         if self.odds_of_motion < _ODDS:
             found.append("the reference changes too little: its functions hardly show in the channels")
-        if self.predicted < self.fitted - _LOST:
+        if self.lost > _LOST:
             found.append(
-                f"{100 * self.fitted:.0f}% of the readings' variance is explained, but only "
-                f"{100 * max(self.predicted, 0.0):.0f}% of a quarter that the fit did not see"
+                "a quarter of the recording has other coefficients than the rest, which miss "
+                f"{100 * min(self.lost, 1.0):.0f}% of its variance"
             )
         return found
 
@@ -186,7 +184,7 @@ def align(readings: Readings, basis: Basis, *, most_rate_error: float = 0.02) ->
     return Alignment(
         best.offset, found.std[0], best.rate_error, found.std[1], best.length,
         apart[0].offset if apart else float("nan"), best.odds_over(apart[0].explained) if apart else float("inf"),
-        found.explained, found.independent, found.coefficients, found.coefficient_std, found.predicted, found.fitted,
+        found.explained, found.independent, found.coefficients, found.coefficient_std, found.lost,
         best.at_bound, found.odds_of_motion, best.middle,
     )  # fmt: skip
 

@@ -47,8 +47,7 @@ class Estimate:
     independent: NDArray[np.float64]
     coefficients: NDArray[np.float64]
     coefficient_std: NDArray[np.float64]
-    predicted: float
-    fitted: float
+    lost: float
     odds_of_motion: float
 
 
@@ -161,12 +160,6 @@ class Fit:
         """Share of each channel's variance that the functions explain, (c,)."""
         total = self.variance(self.y - np.sum(self.weight * self.y, axis=0) / self.counts)
         return np.clip(1.0 - self.variance(self.residual()) / total, 0.0, 1.0 - 1e-12)
-
-    @property
-    def fitted(self) -> float:
-        """Share of the variance of all channels together that the functions explain."""
-        residual = self.variance(self.residual())
-        return float(1.0 - np.sum(residual) / np.sum(residual / (1.0 - self.explained)))
 
     def odds_over(self, explained: NDArray[np.float64] | float) -> float:
         """Return the log odds, nats, of this fit over one that explains less of the same channels."""
@@ -388,7 +381,7 @@ class Fit:
         by_chance = np.sqrt(np.einsum("cii->ic", inverse).clip(0.0) * self.variance(residual) / self.share)
         return Estimate(
             (float(std[0]), float(std[1])), self.explained, self.share * self.counts, coefficients, by_chance,
-            self.predicted(matrix), self.fitted, self.odds_over_drift(matrix),
+            self.lost(matrix), self.odds_over_drift(matrix),
         )  # fmt: skip
 
     def odds_over_drift(self, matrix: NDArray[np.float64]) -> float:
@@ -401,18 +394,23 @@ class Fit:
         gained = np.log(self.variance(self.residual(drift)) / self.variance(self.residual(matrix)))
         return float(0.5 * np.sum(self.share * self.counts * gained))
 
-    def predicted(self, matrix: NDArray[np.float64]) -> float:
-        """Return the share of a quarter's variance that coefficients from the other three explain, of the worst."""
+    def lost(self, matrix: NDArray[np.float64]) -> float:
+        """Return which share of a quarter's variance its own coefficients explain and those of the others do not.
+
+        It is that of the quarter which loses most; a quarter that hardly moves counts as one of mean variance.
+        """
         quarter = np.arange(len(self.t)) * 4 // len(self.t)
         mean = np.sum(self.weight * self.y, axis=0) / self.counts
-        around, worst = float(np.sum(self.weight * (self.y - mean) ** 2)) / 4.0, 1.0
+        around, worst = float(np.sum(self.weight * (self.y - mean) ** 2)) / 4.0, 0.0
         for index in range(4):
             mine = (quarter == index)[:, None]
-            others, own = replace(self, weight=self.weight * ~mine), self.weight * mine
-            missed = own * (self.y - matrix @ others.solution(matrix)[0]) ** 2
-            inside = np.sum(own * self.y, axis=0) / np.maximum(own.sum(axis=0), 1.0)
-            total = max(around, float(np.sum(own * (self.y - inside) ** 2)), 1e-18)
-            worst = min(worst, 1.0 - float(missed.sum()) / total)
+            own, others = (replace(self, weight=self.weight * rows) for rows in (mine, ~mine))
+            missed = [
+                float(np.sum(own.weight * (self.y - matrix @ one.solution(matrix)[0]) ** 2)) for one in (own, others)
+            ]
+            inside = np.sum(own.weight * self.y, axis=0) / own.counts
+            total = max(around, float(np.sum(own.weight * (self.y - inside) ** 2)), 1e-18)
+            worst = max(worst, (missed[1] - missed[0]) / total)
         return worst
 
 
