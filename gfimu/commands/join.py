@@ -61,7 +61,9 @@ def join(
     drawing = None if array is None else as_array(array)
     if not isinstance(reference, ReferenceSeries):
         reference = open_reference(
-            with_memory(reference, max_memory), reference_map and load_map(reference_map), column_map and load_map(column_map)
+            with_memory(reference, max_memory),
+            reference_map and load_map(reference_map),
+            column_map and load_map(column_map),
         )
     whole = drawing if not reference.channels else None  # of two loggers each has a part of the array
     source = as_source(channels, whole, column_map, max_memory=max_memory)

@@ -138,8 +138,12 @@ def mapped_recording(
 def _refuse_another_clock(first: Piece, second: Piece) -> None:
     """Refuse two loggers whose readings agree at other times than their files state."""
     one, other = (
-        ReferenceSeries(piece.source, piece.times.t_s + piece.times.origin_s - first.times.origin_s, piece.reference,
-                        channels=piece.channels)
+        ReferenceSeries(
+            piece.source,
+            piece.times.t_s + piece.times.origin_s - first.times.origin_s,
+            piece.reference,
+            channels=piece.channels,
+        )
         for piece in (first, second)
     )
     if min(len(one.t_s), len(other.t_s)) < _FEWEST:

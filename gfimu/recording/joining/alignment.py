@@ -9,7 +9,7 @@ each a hypothesis with its log odds over no relation at all.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
@@ -189,14 +189,18 @@ def align(readings: Readings, basis: Basis, *, most_rate_error: float = 0.02) ->
     )  # fmt: skip
 
 
-def _candidates(
-    readings: Readings, basis: Basis, most: float, width: float
-) -> list[tuple[float, float]]:
+def _candidates(readings: Readings, basis: Basis, most: float, width: float) -> list[tuple[float, float]]:
     """Return offsets, s, and rate errors at which the fit is best among its neighbours, the best first."""
     spans = [one[-1] - one[0] for one in (readings.t_s, basis.times)]
     step = max(width / _PER_WIDTH, sum(spans) / _MOST_STEPS)
-    t, u = (one[0] + step * np.arange(int(span / step) + 1) for one, span in zip((readings.t_s, basis.times), spans, strict=True))
-    y, x = (_means(at, old, series) for at, old, series in ((t, readings.t_s, readings.searched), (u, basis.times, basis.searched)))
+    t, u = (
+        one[0] + step * np.arange(int(span / step) + 1)
+        for one, span in zip((readings.t_s, basis.times), spans, strict=True)
+    )
+    y, x = (
+        _means(at, old, series)
+        for at, old, series in ((t, readings.t_s, readings.searched), (u, basis.times, basis.searched))
+    )
     middle = 0.5 * (u[0] + u[-1])
     peaks = []
     for rate_error in _rate_errors(step, min(len(t), len(u)), most, width):
@@ -217,7 +221,9 @@ def _candidates(
 
 def _means(at: NDArray[np.float64], t: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return means of series (n, c) around uniform times (m,), s."""
-    sums = np.vstack([np.zeros(values.shape[1]), np.cumsum(0.5 * (values[1:] + values[:-1]) * np.diff(t)[:, None], axis=0)])
+    sums = np.vstack(
+        [np.zeros(values.shape[1]), np.cumsum(0.5 * (values[1:] + values[:-1]) * np.diff(t)[:, None], axis=0)]
+    )
     half = 0.5 * (at[1] - at[0])
     ends = np.clip([at - half, at + half], t[0], t[-1])
     low, high = (np.column_stack([np.interp(one, t, whole) for whole in sums.T]) for one in ends)

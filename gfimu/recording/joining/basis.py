@@ -70,8 +70,9 @@ class Basis:
         return cls(CubicSpline(u, np.column_stack([functions, angle(u)])), True, walk, searched, u)
 
     @classmethod
-    def of_body(cls, t: NDArray[np.float64], gyro: NDArray[np.float64] | None,
-                channels: Mapping[str, NDArray[np.float64]]) -> Basis:
+    def of_body(
+        cls, t: NDArray[np.float64], gyro: NDArray[np.float64] | None, channels: Mapping[str, NDArray[np.float64]]
+    ) -> Basis:
         """Return the functions of a gyro's rates (m, 3), rad/s, and of a logger's accelerations (m,), m/s²."""
         known = [*([] if gyro is None else [gyro]), *(one[:, None] for one in channels.values())]
         u, values, _ = smoothed(t, np.column_stack(known))
@@ -161,7 +162,9 @@ class Readings:
     step: float
 
     @classmethod
-    def of(cls, t: NDArray[np.float64], values: NDArray[np.float64], step: float, chips: Sequence[str] = ()) -> Readings:
+    def of(
+        cls, t: NDArray[np.float64], values: NDArray[np.float64], step: float, chips: Sequence[str] = ()
+    ) -> Readings:
         """Return means of values (n, c) at times (n,), s; searched by their sizes per chip where names are given."""
         period = float(np.median(np.diff(t)))
         step = period * max(int(max(step, float(t[-1] - t[0]) / _MOST_ROWS) / period), 1)
@@ -197,7 +200,9 @@ def smoothed(
     count = np.bincount(place)
     means = [np.bincount(place, one) / count for one in (t, *values.T)]
     grid = CubicSpline(means[0], np.column_stack(means[1:]))(u)
-    gap = np.diff(means[0], append=means[0][-1])[np.clip(np.searchsorted(means[0], u) - 1, 0, None)] > _LONGEST_GAP * step
+    gap = (
+        np.diff(means[0], append=means[0][-1])[np.clip(np.searchsorted(means[0], u) - 1, 0, None)] > _LONGEST_GAP * step
+    )
     lines = np.column_stack([np.interp(u, means[0], one) for one in means[1:]])
     grid[gap] = lines[gap]
     line = np.linspace(grid[0], grid[-1], len(u))  # so that the ends, which the transform mirrors, have no step

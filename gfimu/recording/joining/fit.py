@@ -8,7 +8,7 @@ true value lies beyond it (J. Tobin, Econometrica 26, 1958).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -31,7 +31,7 @@ _SURE = 30.0  # nats by which that is decided: with residuals as correlated as h
 _LEAST_WEIGHT = 1e-3  # of a clipped reading, below which it says nothing
 _AT_BOUND = 0.99  # of the largest rate error
 _PHASE = 0.7  # rad between tried rate errors, at the end that is further off
-_MOST_TRIED = 400
+_MOST_TRIED, _VALLEY = 400, 4  # rate errors, and those to either side for which the shift is solved
 _MARGIN, _LONGEST_MARGIN = 0.02, 1.0  # of the overlap, and s, that are left out at its ends
 _ITERATIONS, _HALVINGS = 20, 10
 _SETTLED = 1e-3  # nats that a last step gains
@@ -279,13 +279,19 @@ class Fit:
         """
         if _RATE not in self.free:
             return [self]
-        bend = replace(self, leaning=False).curvature()[1].sum(axis=0)
-        valley = -float(bend[0, 1] / max(bend[0, 0], 1e-300))
-        reach = float(np.max(np.abs(self.basis.angle(self.reference_times(), 1) * (self.t + valley)), initial=1e-9))
-        step = max(_PHASE / reach, 2.0 * self.most / _MOST_TRIED)
-        shift, now = self.at[[_SHIFT, _RATE]].tolist()
-        others = np.arange(-self.most, self.most, step).tolist()
-        return [self, *(self.with_changes({_SHIFT: shift + valley * (one - now), _RATE: one}) for one in others)]
+        now, fit, valley = self.rate_error, replace(self, leaning=False, free=(_SHIFT,)), []
+        for rates in (np.linspace(now, self.most, _VALLEY), np.linspace(now, -self.most, _VALLEY)[1:]):
+            along = fit
+            for rate in rates.tolist():
+                along = along.with_changes({_RATE: rate}).solved()
+                valley.append(along.at[[_RATE, _SHIFT]])
+        valley.sort(key=lambda one: float(one[0]))
+        rates, shifts = np.array(valley).T
+        slope = (shifts[-1] - shifts[0]) / max(rates[-1] - rates[0], 1e-9)
+        reach = float(np.max(np.abs(self.basis.angle(self.reference_times(), 1) * (self.t + slope)), initial=1e-9))
+        tried = np.arange(-self.most, self.most, max(_PHASE / reach, 2.0 * self.most / _MOST_TRIED))
+        moved = zip(np.interp(tried, rates, shifts).tolist(), tried.tolist(), strict=True)
+        return [self, *(self.with_changes({_SHIFT: shift, _RATE: rate}) for shift, rate in moved)]
 
     def other_gains(self) -> list[Fit]:
         """Return starts with all gains of an analogue tachometer at which gravity has another phase."""
@@ -356,11 +362,16 @@ class Fit:
         if exact:
             size = self.free.index(_RATE) + 1 if _RATE in self.free else 1
             steps = [0.1 * self.step, 0.1 * self.step / self.length][:size]
-            second = np.stack([
-                (pulls(self.with_changes({place: self.at[place] + step}))[0]
-                - pulls(self.with_changes({place: self.at[place] - step}))[0])[:, :size] / (2.0 * step)
-                for place, step in enumerate(steps)
-            ])  # (clocks, blocks, clocks)
+            second = np.stack(
+                [
+                    (
+                        pulls(self.with_changes({place: self.at[place] + step}))[0]
+                        - pulls(self.with_changes({place: self.at[place] - step}))[0]
+                    )[:, :size]
+                    / (2.0 * step)
+                    for place, step in enumerate(steps)
+                ]
+            )  # (clocks, blocks, clocks)
             bend[:, :size, :size] = 0.5 * (second.transpose(1, 0, 2) + second.transpose(1, 2, 0))
         return pull, bend
 

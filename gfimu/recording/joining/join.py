@@ -205,9 +205,7 @@ def join_reference(
     return Joined(joined, found, levers, tuple(doubts), *others)
 
 
-def aligned(
-    recording: Recording, reference: ReferenceSeries, *, most_rate_error: float = 0.02
-) -> Alignment | None:
+def aligned(recording: Recording, reference: ReferenceSeries, *, most_rate_error: float = 0.02) -> Alignment | None:
     """Return offset and rate error between the channels' clock and the reference's; None if it does not change.
 
     Raises
@@ -276,7 +274,9 @@ def _joined(
         columns[name], read = nearest_rows(recording.t_s, theirs, values)
         if name in TIME_COLUMNS:
             columns[TIME_COLUMNS[name]] = read
-    for name, values in zip(chip_names(recording.channels, reference.channels), reference.channels.values(), strict=True):
+    for name, values in zip(
+        chip_names(recording.channels, reference.channels), reference.channels.values(), strict=True
+    ):
         channels[name] = at_times(recording.t_s, theirs, values)
     facts = {
         "reference_offset_s": found.offset,
@@ -285,6 +285,11 @@ def _joined(
         "reference_rate_error_std": found.rate_error_std,
     }
     metadata = {**recording.metadata, **facts}
-    joined = replace(recording, readings=np.column_stack([*channels.values()]), channels=tuple(channels),
-                     reference=columns, metadata=metadata)
+    joined = replace(
+        recording,
+        readings=np.column_stack([*channels.values()]),
+        channels=tuple(channels),
+        reference=columns,
+        metadata=metadata,
+    )
     return joined.between(theirs[0], theirs[-1]) if reference.channels else joined

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 from scipy.linalg import null_space
 
-from gfimu.recording.joining.join import FAR, Joined, aligned, join_reference
 from gfimu.recording.joining.alignment import Alignment
+from gfimu.recording.joining.join import FAR, Joined, aligned, join_reference
 from gfimu.recording.joining.series import TABLE_COLUMNS, ReferenceSeries
 from gfimu.recording.recording import Recording
 

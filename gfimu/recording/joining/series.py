@@ -85,9 +85,7 @@ class ReferenceSeries:
         return self.t_s[rows], values[rows]
 
 
-def align_series(
-    first: ReferenceSeries, second: ReferenceSeries, *, most_rate_error: float = 0.02
-) -> Alignment | None:
+def align_series(first: ReferenceSeries, second: ReferenceSeries, *, most_rate_error: float = 0.02) -> Alignment | None:
     """Find the offset and the rate error between the clocks of a first logger and of a reference or a second logger.
 
     Returns None where nothing changes. Gyros count where both loggers have one.

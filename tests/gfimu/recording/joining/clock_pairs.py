@@ -111,7 +111,13 @@ def draw_pair(rng, kind: str | None = None, *, other: bool = False, clip: bool |
         reading = body[2] @ Rotation.random(random_state=int(rng.integers(1 << 31))).as_matrix()
         turned = body[1]
         theirs, seen = _sampled(
-            rng, t, np.column_stack([reading, turned]), rates[1], np.r_[np.full(3, noise), [gyro_noise] * 3], 0.0, jitter
+            rng,
+            t,
+            np.column_stack([reading, turned]),
+            rates[1],
+            np.r_[np.full(3, noise), [gyro_noise] * 3],
+            0.0,
+            jitter,
         )
         gyro = {f"gyro_{axis}_rad_s": one for axis, one in zip("xyz", values[:, -3:].T, strict=True)}
         columns = {f"gyro_{axis}_rad_s": one for axis, one in zip("xyz", seen[:, 3:].T, strict=True)}
@@ -146,7 +152,9 @@ def draw_pair(rng, kind: str | None = None, *, other: bool = False, clip: bool |
         columns = {"angle_rad": seen[:, 0]}
     else:
         count = float(rng.choice([0.0, 0.02, 0.1]))
-        theirs, seen = _sampled(rng, t, (1.0 + rate_error * digital) * turned[:, None], _log(rng, 10.0, 200.0), tacho_noise, count, jitter)
+        theirs, seen = _sampled(
+            rng, t, (1.0 + rate_error * digital) * turned[:, None], _log(rng, 10.0, 200.0), tacho_noise, count, jitter
+        )
         columns = {"tacho_rad_s": seen[:, 0]}
     series = ReferenceSeries("reference.csv", (theirs - offset) / (1.0 + rate_error), columns)
     return Pair(kind, Recording(times, values, _names(chips)), series, offset, rate_error)
