@@ -1,10 +1,14 @@
 """Find the offset and the rate error between two clocks, and put channels and reference into one recording.
 
+The reference may be another logger on the same body; the recording then holds the channels of both.
+
 Exit code 2 if the two files don't seem to belong together; --force writes them all the same.
 
 Examples
 --------
 gfimu join logger.csv tacho.csv --map klipper --array mine.toml --out run.parquet
+# Two loggers on one body, each with a part of the array
+gfimu join left.csv right.csv --map logger.toml --array pair.toml --out run.parquet
 # A file of references of another layout
 gfimu join run.csv encoder.csv --reference-map encoder_map.toml --out joined.parquet
 """
@@ -21,7 +25,7 @@ if TYPE_CHECKING:
 
 __all__ = ["join"]
 
-_REFERENCE = file_argument("File of the tachometer, encoder, command or gyro.", "REFERENCE")
+_REFERENCE = file_argument("File of the tachometer, encoder, command or gyro, or of another logger.", "REFERENCE")
 _RATE_ERROR = Option("Largest rate error between the clocks that is searched, a ratio.")
 
 
@@ -60,11 +64,8 @@ def join(
 
     drawing = None if array is None else as_array(array)
     if not isinstance(reference, ReferenceSeries):
-        reference = open_reference(
-            with_memory(reference, max_memory),
-            reference_map and load_map(reference_map),
-            column_map and load_map(column_map),
-        )
+        maps = [None if one is None else load_map(one) for one in (reference_map, column_map)]
+        reference = open_reference(with_memory(reference, max_memory), *maps)
     whole = drawing if not reference.channels else None  # of two loggers each has a part of the array
     source = as_source(channels, whole, column_map, max_memory=max_memory)
     recording = open_recording(source, array=whole)

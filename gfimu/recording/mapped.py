@@ -155,8 +155,8 @@ def _refuse_another_clock(first: Piece, second: Piece) -> None:
     allowed = one.period + other.period + _SURE * found.largest_std  # less is a delay of a filter, not a clock
     if np.abs(late).max() > allowed:
         raise InputError(
-            f"{second.source}: its clock is not that of {first.source}: what both read agrees where its times are moved "
-            f"by {late[1]:+.5g} ± {found.offset_std:.2g} s (rate error {100.0 * found.rate_error:+.3f} %); "
+            f"{second.source}: its clock is not that of {first.source}: what both read agrees where its times are "
+            f"moved by {late[1]:+.5g} ± {found.offset_std:.2g} s (rate error {100.0 * found.rate_error:+.3f} %); "
             f"gfimu join {first.source} {second.source} --map MAP --array ARRAY --out RUN aligns the two"
         )
 

@@ -25,7 +25,7 @@ from gfimu.diagnosis.design.planned_run import recorded_stretches
 from gfimu.diagnosis.design.proposal import SEPARATED
 from gfimu.diagnosis.policy import Policy
 from gfimu.model.world_model import WorldModel, is_linear, reads_place
-from gfimu.recording import Recording
+from gfimu.recording import Recording, own_alignment
 from gfimu.recording.checks import check_recording
 from gfimu.recording.importing.oddities import oddities
 
@@ -48,6 +48,8 @@ class UsefulRun:
         Share of the time in each direction, and at rest, from which it is there [1].
     turns : float
         Whole turns one way [1], so that what returns once per turn is seen to return.
+    displaced : float
+        Standard deviations [1] from which a reference is early or late.
     """
 
     duration: float = 30.0
@@ -55,6 +57,7 @@ class UsefulRun:
     speed: float = 0.01
     share: float = 0.05
     turns: float = 3.0
+    displaced: float = 5.0
 
 
 @dataclass(frozen=True)
@@ -244,6 +247,7 @@ def check_runs(
         readings = recording.for_array(model.array)
         odd = oddities(dict(zip(model.array.channels, readings.T, strict=True)))
         findings += [f"{name}: {one}" for one in odd]
+        findings += [f"{name}: {one}" for one in _times_of_reference(recording, model)]
         if len(recording.gaps):
             findings.append(f"{name}: {len(recording.gaps)} gaps in its times")
     seen = tuple(_with_temperature(name, one) for name, one in zip(names, recordings, strict=True))
@@ -253,6 +257,21 @@ def check_runs(
     seen = tuple(_with_motion(one, run, model, useful) for one, run in zip(seen, runs, strict=True))
     effects = _effects(runs, model)
     return RunCheck(seen, tuple(findings), effects, tuple(_advice(seen, effects, useful)))
+
+
+def _times_of_reference(recording: Recording, model: WorldModel) -> list[str]:
+    """Return where the reference does not fit the channels in time."""
+    found = None if model.drive_source == "gyro" or is_linear(model) else own_alignment(recording)
+    if found is None or found.doubts:
+        return []
+    late = found.apart(found.middle_s)
+    if abs(late) < max(UsefulRun().displaced * found.offset_std, recording.sample_period):
+        return []
+    text = (
+        f"the reference is {abs(late):.3g} ± {found.offset_std:.2g} s {'early' if late > 0.0 else 'late'} against the "
+        "channels in the middle of the recording"
+    )
+    return [text]
 
 
 def _with_motion(seen: CheckedRun, run: Run, model: WorldModel, useful: UsefulRun) -> CheckedRun:

@@ -2,8 +2,8 @@
 
 The readings of one file are linear in functions of the other (`gfimu.recording.joining.basis`). For every offset these
 functions are fitted to the readings by least squares; the offset of the best fit is the one sought. Correlations by FFT
-give all offsets at once, on a grid of rate errors. A nonlinear fit refines the best few (`gfimu.recording.joining.fit`),
-each a hypothesis with its log odds over no relation at all.
+give all offsets at once, on a grid of rate errors. A nonlinear fit (`gfimu.recording.joining.fit`) refines the best
+few, each a hypothesis with its log odds over no relation at all.
 """
 
 from __future__ import annotations
@@ -246,7 +246,7 @@ def _stretched(functions: NDArray[np.float64], rate_error: float) -> NDArray[np.
 
 def _curve(y: NDArray[np.float64], x: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
     """Return lags, and the log odds of every lag over no relation, of series (n, c) and functions (m, k)."""
-    (n, c), (m, k) = y.shape, x.shape
+    n, (m, k) = len(y), x.shape
     size = next_fast_len(n + m)
     lags = np.arange(-(m - 1), n)  # row of the series at which the functions begin
     y = y - y.mean(axis=0)

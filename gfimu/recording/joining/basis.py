@@ -196,7 +196,7 @@ def smoothed(
     step = max(float(np.median(np.diff(t))), float(t[-1] - t[0]) / _MOST_ROWS)
     u = t[0] + step * np.arange(int((t[-1] - t[0]) / step) + 1)
     place = np.clip(np.round((t - t[0]) / step).astype(int), 0, len(u) - 1)
-    rows, place = np.unique(place, return_inverse=True)
+    place = np.unique(place, return_inverse=True)[1]
     count = np.bincount(place)
     means = [np.bincount(place, one) / count for one in (t, *values.T)]
     grid = CubicSpline(means[0], np.column_stack(means[1:]))(u)

@@ -438,11 +438,8 @@ def refined(readings: Readings, basis: Basis, offset: float, rate_error: float, 
 def leaning(fit: Fit, readings: Readings) -> list[Fit]:
     """Return starts with gravity at a table's angle near a fit without: of an exact tachometer, and an analogue one."""
     plain = replace(Fit.of(readings, fit.basis, fit.offset, fit.rate_error, fit.most, leaning=True), share=fit.share)
-    found = []
-    for starts in (plain.other_rates(), plain.other_gains() if fit.basis.walk else []):
-        if starts:
-            found.append(min(starts, key=lambda one: one.misfit()).weighted())
-    return found
+    kinds = [plain.other_rates(), *([plain.other_gains()] if fit.basis.walk else [])]
+    return [min(starts, key=lambda one: one.misfit()).weighted() for starts in kinds]
 
 
 def _scattered(pull: NDArray[np.float64], bend: NDArray[np.float64], prior: NDArray[np.float64]) -> NDArray[np.float64]:

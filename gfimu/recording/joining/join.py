@@ -54,6 +54,8 @@ class Joined(Declared, PlottedResult):
         runs at its own rate from there. A diagnosis finds `clock_error` in it.
     by_reference_clock : Recording
         The same with the channels' times on the reference's clock, which rates in rad/s are of.
+    reference_origin_s : float
+        Time on the reference's clock at which its times are zero, s.
 
     Examples
     --------
@@ -69,6 +71,7 @@ class Joined(Declared, PlottedResult):
     doubts: Annotated[tuple[str, ...], figure("Why the two files may not belong together.")]
     by_own_rate: Recording
     by_reference_clock: Recording
+    reference_origin_s: float = 0.0
 
     @property
     def explained(
@@ -79,6 +82,23 @@ class Joined(Declared, PlottedResult):
     ]:
         """Share of each channel's variance that the reference explains."""
         return dict(zip(self.recording.channels, self.alignment.explained.tolist(), strict=False))
+
+    @property
+    def clock_shift_s(
+        self,
+    ) -> Annotated[
+        float,
+        figure(
+            "What the reference's clock reads less what the channels' reads, in the middle, as the files state it.",
+            "s",
+            before="levers_m",
+            form=".7g",
+            head="reference's clock less the channels', in the middle",
+        ),
+    ]:
+        """What the reference's clock reads less what the channels' reads, in the middle of the common time, s."""
+        origin = self.recording.metadata.get("time_origin_s", 0.0)
+        return self.reference_origin_s - float(origin) - float(self.alignment.apart(self.alignment.middle_s))
 
     @property
     def offset_at_start(self) -> tuple[float, float]:
@@ -202,7 +222,7 @@ def join_reference(
         reason = f"these recordings don't seem to belong together: {'; '.join(doubts)}" if doubts else unsure
         raise InputError(f"{reference.source}: {reason}; --force (force=True) joins them all the same")
     doubts += [unsure] if unsure else []
-    return Joined(joined, found, levers, tuple(doubts), *others)
+    return Joined(joined, found, levers, tuple(doubts), *others, reference.origin_s)
 
 
 def aligned(recording: Recording, reference: ReferenceSeries, *, most_rate_error: float = 0.02) -> Alignment | None:
@@ -275,7 +295,7 @@ def _joined(
         if name in TIME_COLUMNS:
             columns[TIME_COLUMNS[name]] = read
     for name, values in zip(
-        chip_names(recording.channels, reference.channels), reference.channels.values(), strict=True
+        chip_names(recording.channels, [*reference.channels]), reference.channels.values(), strict=True
     ):
         channels[name] = at_times(recording.t_s, theirs, values)
     facts = {

@@ -102,7 +102,7 @@ def draw_pair(rng, kind: str | None = None, *, other: bool = False, clip: bool |
     if kind in {"gyro", "loggers"}:
         chips = 1 if kind == "loggers" else 2
         first, second = (_free(rng, t, chips) for _ in range(2))
-        accelerations, turning, far = first
+        accelerations, turning, _ = first
         gyro_noise = _log(rng, 0.002, 0.02)
         whole = np.column_stack([accelerations, turning])
         levels = np.r_[np.full(accelerations.shape[1], noise), np.full(3, gyro_noise)]
@@ -161,7 +161,7 @@ def draw_pair(rng, kind: str | None = None, *, other: bool = False, clip: bool |
 
 
 def _free(rng, t, chips):
-    """Return accelerations of some chips, the body's rates, and the acceleration at the other logger, of a free body."""
+    """Return accelerations of some chips of a free body, its rates, and the acceleration at another logger."""
     turning = np.column_stack([rng.uniform(0.5, 3.0) * _slow(rng, t, rng.uniform(0.3, 1.0)) for _ in range(3)])
     turning *= (0.3 + np.abs(_slow(rng, t, 6.0)))[:, None]
     alpha = np.gradient(turning, 1.0 / FINE, axis=0)
