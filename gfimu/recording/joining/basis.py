@@ -59,7 +59,9 @@ class Basis:
     def of_table(cls, t: NDArray[np.float64], values: NDArray[np.float64], *, is_angle: bool) -> Basis:
         """Return the functions of a table's rate (m,), rad/s, or of its angle, rad."""
         if is_angle:
-            t, values = 0.5 * (t[1:] + t[:-1]), np.diff(values) / np.diff(t)
+            step = max(float(np.median(np.diff(t))), float(t[-1] - t[0]) / _MOST_ROWS)
+            u = t[0] + step * np.arange(int((t[-1] - t[0]) / step) + 1)  # uneven stamps would bias the differences
+            t, values = 0.5 * (u[1:] + u[:-1]), np.diff(CubicSpline(t, values)(u)) / step
         u, smooth, noise = smoothed(t, values[:, None])
         angle = CubicSpline(u, smooth[:, 0]).antiderivative()
         functions = np.column_stack([angle(u, 1) ** 2, angle(u, 2)])
