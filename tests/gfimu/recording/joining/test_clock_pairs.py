@@ -6,8 +6,7 @@ from clock_pairs import draw_pair
 
 import gfimu
 from gfimu import InputError
-from gfimu.recording import join_reference, own_alignment
-from gfimu.recording.recording import Recording
+from gfimu.recording import Recording, join_reference, own_alignment
 
 KINDS = ("sweep", "steps", "hand", "swing", "loggers", "spin_up")
 NAMES = ("a11", "a12", "a13")
