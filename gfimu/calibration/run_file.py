@@ -70,7 +70,7 @@ def open_references(path: RecordingSource) -> Recording:
     if isinstance(path, Recording):
         return path
     if isinstance(path, MappedFile) and path.column_map.reference and not path.column_map.channels:
-        t, columns, _ = mapped_reference(path.path, path.column_map)
+        t, columns, *_ = mapped_reference(path.path, path.column_map)
         return Recording(t, np.empty((len(t), 0)), (), columns)
     if isinstance(path, MappedFile):
         return path.read(None)

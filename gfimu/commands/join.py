@@ -1,10 +1,14 @@
 """Find the offset and the rate error between two clocks, and put channels and reference into one recording.
 
+The reference may be another logger on the same body; the recording then holds the channels of both.
+
 Exit code 2 if the two files don't seem to belong together; --force writes them all the same.
 
 Examples
 --------
 gfimu join logger.csv tacho.csv --map klipper --array mine.toml --out run.parquet
+# Two loggers on one body, each with a part of the array
+gfimu join left.csv right.csv --map logger.toml --array pair.toml --out run.parquet
 # A file of references of another layout
 gfimu join run.csv encoder.csv --reference-map encoder_map.toml --out joined.parquet
 """
@@ -21,7 +25,7 @@ if TYPE_CHECKING:
 
 __all__ = ["join"]
 
-_REFERENCE = file_argument("File of the tachometer, encoder, command or gyro.", "REFERENCE")
+_REFERENCE = file_argument("File of the tachometer, encoder, command or gyro, or of another logger.", "REFERENCE")
 _RATE_ERROR = Option("Largest rate error between the clocks that is searched, a ratio.")
 
 
@@ -59,15 +63,18 @@ def join(
     from gfimu.recording.joining import ReferenceSeries, join_reference, open_reference
 
     drawing = None if array is None else as_array(array)
-    source = as_source(channels, array, column_map, max_memory=max_memory)
-    recording = open_recording(source, array=drawing)
-    examine(recording, drawing, source=name_of(channels), force=force)
-    if drawing is not None:
-        recording = recording.carrying(drawing)
     if not isinstance(reference, ReferenceSeries):
-        mapped = None if reference_map is None else load_map(reference_map)
-        reference = open_reference(with_memory(reference, max_memory), mapped)
+        maps = [None if one is None else load_map(one) for one in (reference_map, column_map)]
+        reference = open_reference(with_memory(reference, max_memory), *maps)
+    whole = drawing if not reference.channels else None  # of two loggers each has a part of the array
+    source = as_source(channels, whole, column_map, max_memory=max_memory)
+    recording = open_recording(source, array=whole)
+    examine(recording, whole, source=name_of(channels), force=force)
+    if whole is not None:
+        recording = recording.carrying(whole)
     joined = join_reference(recording, reference, most_rate_error=most_rate_error, force=force)
+    if drawing is not None and whole is None:
+        joined = joined.carrying(drawing)
     if out is not None:
         joined.recording.write(out)
     return joined

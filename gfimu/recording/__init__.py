@@ -27,7 +27,13 @@ if TYPE_CHECKING:
     from gfimu.recording.importing.readers import read_foreign
     from gfimu.recording.importing.readers.registry import format_of
     from gfimu.recording.importing.readers.text import table_of_text
-    from gfimu.recording.joining import ReferenceSeries, displaced_reference, join_reference, open_reference
+    from gfimu.recording.joining import (
+        ReferenceSeries,
+        displaced_reference,
+        join_reference,
+        open_reference,
+        own_alignment,
+    )
     from gfimu.recording.mapped import mapped_recording
     from gfimu.recording.mimu4444 import is_mimu4444
     from gfimu.recording.reading import read_bytes

@@ -23,9 +23,13 @@ from gfimu.recording.importing.column_map import UNMAPPED, ColumnMap, load_map
 from gfimu.recording.importing.piece import Piece, combined_file, merged_piece, piece_of
 from gfimu.recording.importing.readers import read_foreign
 from gfimu.recording.importing.readers.tables import table_file
+from gfimu.recording.joining.series import ReferenceSeries, align_series
 from gfimu.recording.recording import Recording
 from gfimu.recording.tables.arrow import ArrowStream
 from gfimu.recording.tables.table_columns import TableColumns
+
+_FEWEST = 50  # samples of two loggers, whose clocks are compared
+_SURE = 5.0  # standard deviations from which two clocks differ
 
 __all__ = ["MappedFile", "RecordingLike", "RecordingSource", "mapped_recording", "mapped_reference"]
 
@@ -123,16 +127,44 @@ def mapped_recording(
     whole = combined_file(files, chosen)
     pieces = [piece_of(one, chosen) for one in (files if whole is None else [whole])]
     geometry = array or (AccelerometerArray.load(chosen.array) if chosen.array and len(pieces) == 1 else None)
+    for piece in pieces[1:]:
+        _refuse_another_clock(pieces[0], piece)
     merged = _between(merged_piece(pieces), chosen)
     for note in merged.times.notes:
         warn(note)
     return _recording(merged, chosen, geometry, [file.source for file in files])
 
 
+def _refuse_another_clock(first: Piece, second: Piece) -> None:
+    """Refuse two loggers whose readings agree at other times than their files state."""
+    one, other = (
+        ReferenceSeries(
+            piece.source,
+            piece.times.t_s + piece.times.origin_s - first.times.origin_s,
+            piece.reference,
+            channels=piece.channels,
+        )
+        for piece in (first, second)
+    )
+    if min(len(one.t_s), len(other.t_s)) < _FEWEST:
+        return
+    found = align_series(one, other)
+    if found is None or found.doubts:
+        return
+    late = found.apart(np.array([-0.5, 0.0, 0.5]) * found.overlap_s + found.middle_s)
+    allowed = one.period + other.period + _SURE * found.largest_std  # less is a delay of a filter, not a clock
+    if np.abs(late).max() > allowed:
+        raise InputError(
+            f"{second.source}: its clock is not that of {first.source}: what both read agrees where its times are "
+            f"moved by {late[1]:+.5g} ± {found.offset_std:.2g} s (rate error {100.0 * found.rate_error:+.3f} %); "
+            f"gfimu join {first.source} {second.source} --map MAP --array ARRAY --out RUN aligns the two"
+        )
+
+
 def mapped_reference(
     path: str | Path, column_map: ColumnMap
-) -> tuple[NDArray[np.float64], dict[str, NDArray[np.float64]], float]:
-    """Read the references alone of a foreign file by a map of its columns.
+) -> tuple[NDArray[np.float64], dict[str, NDArray[np.float64]], float, dict[str, NDArray[np.float64]]]:
+    """Read the references, and the channels if it has any, of a foreign file by a map of its columns.
 
     Returns
     -------
@@ -142,20 +174,22 @@ def mapped_reference(
         References by their name, SI.
     origin_s : float
         Time on the file's clock at which ``t_s`` is zero, s.
+    channels : dict of str to ndarray, shape (m,)
+        Channels by their name, m/s².
 
     Raises
     ------
     InputError
-        As `mapped_recording`; also if the map names no reference that the file has.
+        As `mapped_recording`; also if the map names no reference and no channel that the file has.
     """
     piece = _between(piece_of(read_foreign(path, column_map.format, column_map.text), column_map), column_map)
-    if not piece.reference:
+    if not piece.reference and not piece.channels:
         raise InputError(
             f"{path}: map {column_map.name!r} gives no reference; add one under [reference], as tacho_rad_s"
         )
     for note in piece.times.notes:
         warn(note)
-    return piece.times.t_s, dict(piece.reference), piece.times.origin_s
+    return piece.times.t_s, dict(piece.reference), piece.times.origin_s, dict(piece.channels)
 
 
 def _between(piece: Piece, chosen: ColumnMap) -> Piece:

@@ -25,7 +25,7 @@ from gfimu.diagnosis.design.planned_run import recorded_stretches
 from gfimu.diagnosis.design.proposal import SEPARATED
 from gfimu.diagnosis.policy import Policy
 from gfimu.model.world_model import WorldModel, is_linear, reads_place
-from gfimu.recording import Recording
+from gfimu.recording import Recording, own_alignment
 from gfimu.recording.doubts.judge import doubts_of
 
 __all__ = ["CheckedRun", "EffectView", "RunCheck", "UsefulRun", "check_runs", "turns_one_way"]
@@ -47,6 +47,8 @@ class UsefulRun:
         Share of the time in each direction, and at rest, from which it is there [1].
     turns : float
         Whole turns one way [1], so that what returns once per turn is seen to return.
+    displaced : float
+        Standard deviations [1] from which a reference is early or late.
     """
 
     duration: float = 30.0
@@ -54,6 +56,7 @@ class UsefulRun:
     speed: float = 0.01
     share: float = 0.05
     turns: float = 3.0
+    displaced: float = 5.0
 
 
 @dataclass(frozen=True)
@@ -240,6 +243,7 @@ def check_runs(
     findings: list[str] = []
     for recording, name in zip(recordings, names, strict=True):
         findings += [f"{name}: {one.text}" for one in doubts_of(recording, model.array)]
+        findings += [f"{name}: {one}" for one in _times_of_reference(recording, model)]
     seen = tuple(_with_temperature(name, one) for name, one in zip(names, recordings, strict=True))
     if model.drive_source == "gyro":
         return RunCheck(seen, tuple(findings), (), ())
@@ -247,6 +251,21 @@ def check_runs(
     seen = tuple(_with_motion(one, run, model, useful) for one, run in zip(seen, runs, strict=True))
     effects = _effects(runs, model)
     return RunCheck(seen, tuple(findings), effects, tuple(_advice(seen, effects, useful)))
+
+
+def _times_of_reference(recording: Recording, model: WorldModel) -> list[str]:
+    """Return where the reference does not fit the channels in time."""
+    found = None if model.drive_source == "gyro" or is_linear(model) else own_alignment(recording)
+    if found is None or found.doubts:
+        return []
+    late = found.apart(found.middle_s)
+    if abs(late) < max(UsefulRun().displaced * found.offset_std, recording.sample_period):
+        return []
+    text = (
+        f"the reference is {abs(late):.3g} ± {found.offset_std:.2g} s {'early' if late > 0.0 else 'late'} against the "
+        "channels in the middle of the recording"
+    )
+    return [text]
 
 
 def _with_motion(seen: CheckedRun, run: Run, model: WorldModel, useful: UsefulRun) -> CheckedRun:

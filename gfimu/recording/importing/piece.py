@@ -19,7 +19,7 @@ from gfimu.recording.importing.recognise import fitting_maps
 from gfimu.recording.importing.splitting import split_file
 from gfimu.recording.quantities import TIME_COLUMNS
 
-__all__ = ["Piece", "at_times", "combined_file", "merged_piece", "nearest_rows", "piece_of"]
+__all__ = ["Piece", "at_times", "chip_names", "combined_file", "merged_piece", "nearest_rows", "piece_of"]
 
 _GAP = 1.5  # sample periods, from which values are not interpolated
 _SLOWER = 1.5  # sample periods of the channels, between the values of a reference that keeps its own times
@@ -283,8 +283,7 @@ def merged_piece(pieces: Sequence[Piece]) -> Piece:
         notes += piece.times.notes
         notes.append(f"{piece.source}: interpolated to the sample times of {first.source}")
         for name, values in piece.channels.items():
-            chip, axis = name[:-1], name[-1]
-            channels[f"{_chip_name(chips, chip, number)}{axis}"] = at_times(t, piece.times.t_s + shift, values)
+            channels[f"{_chip_name(chips, name[:-1], number)}{name[-1]}"] = at_times(t, piece.times.t_s + shift, values)
     return Piece(
         first.source,
         replace(first.times, t_s=t, notes=tuple(notes)),
@@ -292,6 +291,12 @@ def merged_piece(pieces: Sequence[Piece]) -> Piece:
         {name: values[rows] for name, values in first.reference.items()},
         {name: values[rows] for name, values in first.other.items()},
     )
+
+
+def chip_names(first: Sequence[str], second: Sequence[str]) -> list[str]:
+    """Return names of a second file's channels beside the first one's: its chips are numbered after those."""
+    chips = list(dict.fromkeys(name[:-1] for name in first))
+    return [f"{_chip_name(chips, name[:-1], 1)}{name[-1]}" for name in second]
 
 
 def _chip_name(chips: Sequence[str], chip: str, number: int) -> str:

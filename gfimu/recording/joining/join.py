@@ -8,31 +8,22 @@ from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
+from gfimu.array.array import AccelerometerArray
 from gfimu.base.declared import Declared, Table, figure
 from gfimu.base.errors import InputError
 from gfimu.base.results import Panel, PlottedResult, Series, text_column
-from gfimu.recording.doubts.rails import rails_of
-from gfimu.recording.importing.piece import nearest_rows
-from gfimu.recording.joining.alignment import align
-from gfimu.recording.joining.reference_file import ReferenceSeries
-from gfimu.recording.joining.signals import Alignment, Signals, functions_of, smooth, uniform
+from gfimu.recording.importing.piece import at_times, chip_names, nearest_rows
+from gfimu.recording.joining.alignment import Alignment
+from gfimu.recording.joining.series import ReferenceSeries, align_series
 from gfimu.recording.quantities import TIME_COLUMNS
 from gfimu.recording.recording import Recording
 
-__all__ = ["FAR", "Joined", "grids", "join_reference"]
+__all__ = ["FAR", "Joined", "aligned", "join_reference"]
 
-_MOST_ROWS = 20_000  # of the grid on which offsets are searched
-_FINEST = 0.005  # s, step of that grid
-_ODDS = 30.0  # nats, by which the best offset has to beat the next, and a foreign reference
 _LEVERS = 5.0  # standard deviations between the levers by ω² and by α
 _LEVER_SHARE = 0.15  # of a lever: gains, axes and a tilt of the table make it differ by so much
-_LOST = 0.2  # of the variance, on a quarter that the fit did not see
-_FOREIGN = 6  # references of shuffled pieces
 _MOST_RATE_ERROR = 0.5  # ratio that can be searched at most
-_SHORTEST_WINDOW, _LONGEST_WINDOW = 0.05, 1.0  # s, of the smoothing; at least three samples of the reference
-_NOISY = 0.05  # of the variance of α, that is noise
 _LARGEST_STDS = 3.0  # standard deviations of the time between the clocks that have to be below FAR
 _RATE_STDS = 5.0  # standard deviations from which a rate error is no chance: the stated ones may be low by a factor
 
@@ -63,6 +54,8 @@ class Joined(Declared, PlottedResult):
         runs at its own rate from there. A diagnosis finds `clock_error` in it.
     by_reference_clock : Recording
         The same with the channels' times on the reference's clock, which rates in rad/s are of.
+    reference_origin_s : float
+        Time on the reference's clock at which its times are zero, s.
 
     Examples
     --------
@@ -72,58 +65,40 @@ class Joined(Declared, PlottedResult):
 
     recording: Recording
     alignment: Annotated[Alignment, figure("Offset and rate error.", flat=True)]
-    odds_over_second: Annotated[
-        float,
-        figure(
-            "Log odds over the next-best offset.",
-            "nats",
-            key="log_odds_over_second",
-            form=".0f",
-            head="log odds over the next-best offset",
-        ),
-    ]
-    odds_over_foreign: Annotated[
-        float,
-        figure(
-            "Log odds over shuffled references.",
-            "nats",
-            key="log_odds_over_foreign",
-            form=".0f",
-            head="log odds over shuffled references",
-        ),
-    ]
     levers_m: Annotated[
         dict[str, Lever], figure("Distance of each chip from the axis, by two terms that have to agree.", "m")
     ]
     doubts: Annotated[tuple[str, ...], figure("Why the two files may not belong together.")]
     by_own_rate: Recording
     by_reference_clock: Recording
+    reference_origin_s: float = 0.0
 
     @property
     def explained(
         self,
     ) -> Annotated[
         dict[str, float],
-        figure("Share of each channel's variance that the reference explains.", before="odds_over_second"),
+        figure("Share of each channel's variance that the reference explains.", before="levers_m"),
     ]:
         """Share of each channel's variance that the reference explains."""
         return dict(zip(self.recording.channels, self.alignment.explained.tolist(), strict=False))
 
     @property
-    def second_offset_s(
+    def clock_shift_s(
         self,
     ) -> Annotated[
         float,
         figure(
-            "Next-best offset apart from this one; null without any.",
+            "What the reference's clock reads less what the channels' reads, in the middle, as the files state it.",
             "s",
-            before="odds_over_second",
-            form=".5g",
-            head="next-best offset",
+            before="levers_m",
+            form=".7g",
+            head="reference's clock less the channels', in the middle",
         ),
     ]:
-        """Next-best offset apart from this one, s; NaN without any."""
-        return self.alignment.second_offset
+        """What the reference's clock reads less what the channels' reads, in the middle of the common time, s."""
+        origin = self.recording.metadata.get("time_origin_s", 0.0)
+        return self.reference_origin_s - float(origin) - float(self.alignment.apart(self.alignment.middle_s))
 
     @property
     def offset_at_start(self) -> tuple[float, float]:
@@ -154,6 +129,18 @@ class Joined(Declared, PlottedResult):
             "rate_error": found.rate_error,
             "rate_error_std": found.rate_error_std,
         }
+
+    def carrying(self, array: AccelerometerArray) -> Joined:
+        """Return the recordings of two loggers with the array of both, whose channels are in their order."""
+        recordings = [self.recording, self.by_own_rate, self.by_reference_clock]
+        if len(self.recording.channels) != array.n_channels:
+            raise InputError(
+                f"the two loggers have {len(self.recording.channels)} channels, array {array.name!r} has "
+                f"{array.n_channels}; give the array that holds the chips of both"
+            )
+        names = self.recording.channels if set(self.recording.channels) == set(array.channels) else array.channels
+        carried = [replace(one, channels=names).carrying(array) for one in recordings]
+        return replace(self, recording=carried[0], by_own_rate=carried[1], by_reference_clock=carried[2])
 
     def to_columns(self) -> dict[str, NDArray[Any]]:
         """Return one row per channel: the share of its variance that the reference explains."""
@@ -197,14 +184,14 @@ def join_reference(
     force: bool = False,
     seen: Recording | None = None,
 ) -> Joined:
-    """Align a reference with channels of another clock and put both into one recording.
+    """Align a reference, or another logger on the same body, with channels, and put both into one recording.
 
     Parameters
     ----------
     recording : Recording
         Channels, m/s².
     reference : ReferenceSeries
-        Tachometer, angle, command or gyro with times of its own.
+        Tachometer, angle, command, gyro or another logger's channels with times of its own.
     most_rate_error : float
         Largest rate error between the clocks that is searched.
     force : bool
@@ -217,44 +204,42 @@ def join_reference(
     InputError
         If the reference does not change, the files are too short, or they don't belong together.
     """
-    if not 0.0 <= most_rate_error <= _MOST_RATE_ERROR:
-        raise InputError(f"largest rate error {most_rate_error}: give a ratio of 0 to {_MOST_RATE_ERROR:g}")
-    signals = grids(recording if seen is None else seen, reference)
-    found = align(signals, most_rate_error=most_rate_error)
+    found = aligned(recording if seen is None else seen, reference, most_rate_error=most_rate_error)
     if found is None:
         raise InputError(
             f"{reference.source}: the reference does not change; a time can't be found from a constant rate"
         )
-    over_second = float("inf") if np.isnan(found.second_offset) else found.odds_over(found.second_explained)
-    over_foreign = min(found.odds_over(one) for one in _foreign(signals))
-    levers, differ = (
-        _levers(recording, found, signals.noisy) if signals.angle is not None and seen is None else ({}, [])
-    )
-    doubts = []
-    if over_foreign < _ODDS:
-        doubts.append("a reversed or shuffled reference fits nearly as well")
-    if over_second < _ODDS:
-        doubts.append(f"an offset of {found.second_offset:.4g} s fits nearly as well as {found.offset:.4g} s")
-    if found.odds_of_motion < _ODDS:
-        doubts.append("the reference changes too little: its square and acceleration hardly show in the channels")
-    share = float(np.average(found.explained, weights=np.maximum(signals.readings.var(axis=0), 1e-18)))
-    if found.predicted < share - _LOST:
-        doubts.append(
-            f"{100 * share:.0f}% of the readings' variance is explained, but only "
-            f"{100 * max(found.predicted, 0.0):.0f}% of a quarter that the fit did not see"
-        )
-    doubts += differ
+    is_table = not reference.channels and reference.gyro is None
+    levers, differ = _levers(recording, found) if is_table and seen is None else ({}, [])
+    doubts = [*found.doubts, *differ]
     theirs = found.offset + (1.0 + found.rate_error) * reference.t_s
     joined = _joined(recording, reference, found, theirs)
     start = float(recording.t_s[0])
     own, rows = (start + (one - start) / (1.0 + found.rate_error) for one in (theirs, recording.t_s))
-    others = [_joined(one, reference, found, own) for one in (recording, replace(recording, t_s=rows))]
+    by_own, by_reference = (_joined(one, reference, found, own) for one in (recording, replace(recording, t_s=rows)))
     unsure = _undetermined(found, most_rate_error)
     if (doubts or unsure) and not force:
         reason = f"these recordings don't seem to belong together: {'; '.join(doubts)}" if doubts else unsure
         raise InputError(f"{reference.source}: {reason}; --force (force=True) joins them all the same")
     doubts += [unsure] if unsure else []
-    return Joined(joined, found, over_second, over_foreign, levers, tuple(doubts), *others)
+    return Joined(joined, found, levers, tuple(doubts), by_own, by_reference, reference.origin_s)
+
+
+def aligned(recording: Recording, reference: ReferenceSeries, *, most_rate_error: float = 0.02) -> Alignment | None:
+    """Return offset and rate error between the channels' clock and the reference's; None if it does not change.
+
+    Raises
+    ------
+    InputError
+        If the files are too short, or ``most_rate_error`` is out of its range.
+    """
+    if not 0.0 <= most_rate_error <= _MOST_RATE_ERROR:
+        raise InputError(f"largest rate error {most_rate_error}: give a ratio of 0 to {_MOST_RATE_ERROR:g}")
+    if len(recording) < 16:
+        raise InputError("a recording of fewer than sixteen samples can't be aligned; record longer")
+    channels = dict(zip(recording.channels, recording.readings.T, strict=True))
+    own = ReferenceSeries("the channels", recording.t_s, recording.reference, channels=channels)
+    return align_series(own, reference, most_rate_error=most_rate_error)
 
 
 def _undetermined(found: Alignment, most_rate_error: float) -> str:
@@ -272,83 +257,7 @@ def _undetermined(found: Alignment, most_rate_error: float) -> str:
     return ""
 
 
-def grids(recording: Recording, reference: ReferenceSeries) -> Signals:
-    """Return channels without clipped samples and functions of the reference on uniform grids of one step."""
-    t_reference, rate = reference.rate()
-    if len(recording) < 16:
-        raise InputError("a recording of fewer than sixteen samples can't be aligned; record longer")
-    longest = max(recording.duration, float(t_reference[-1] - t_reference[0]))
-    period = float(np.median(np.diff(t_reference)))
-    step = max(_FINEST, recording.sample_period, longest / _MOST_ROWS)
-    coarse = max(step, period / 4.0)  # a slow reference has no finer detail
-    step = min(max(step, 0.25 * coarse), coarse)
-    angle, walk = reference.angle()
-    on_grid = t_reference[0] + step * np.arange(int((t_reference[-1] - t_reference[0]) / step) + 1)
-    rate = CubicSpline(t_reference, rate)(on_grid) if period > step else uniform(t_reference, rate, step)[0]
-    functions, width, noisy = _smooth_functions(rate, step, period, reference.rate_noise())
-    readings = recording.readings.copy()
-    for column in readings.T:
-        for rail in rails_of(column):
-            column[rail.on] = np.nan
-    readings, known = uniform(recording.t_s, readings, step)
-    spoilt = np.column_stack([np.convolve(one, np.ones(width), "same") > 0.5 for one in (~known).T.astype(float)])
-    return Signals(
-        step,
-        float(recording.t_s[0]),
-        float(t_reference[0]),
-        smooth(readings, width),
-        ~spoilt,
-        functions,
-        rate,
-        None if angle is None else angle(on_grid),
-        walk,
-        width,
-        noisy,
-    )
-
-
-def _smooth_functions(
-    rate: NDArray[np.float64], step: float, period: float, noise: float
-) -> tuple[NDArray[np.float64], int, float]:
-    """Return the functions of a reference, smoothed, the window, so long that α is not noise, and the noise that is.
-
-    The noise is the share of the variance of α by which its coefficients are too small; others would make up for it.
-    Of a rate with white noise σ every P seconds, a Hann window of W seconds leaves a variance 2π² σ² P / W³ in α.
-    """
-    functions = functions_of(rate, step)
-    fastest = float(np.quantile(np.linalg.norm(rate, axis=1), 0.95))
-    longest = min(2.0 * np.pi / max(fastest, 1e-9), _LONGEST_WINDOW)  # a turn, of which half a wave is left
-    window = max(3.0 * period, _SHORTEST_WINDOW)
-    while True:
-        width = round(window / step) | 1
-        smoothed = smooth(functions, width)
-        alpha = float(np.mean(np.var(smoothed[:, 1:] if rate.shape[1] == 1 else smoothed[:, 6:], axis=0)))
-        noisy = 2.0 * np.pi**2 * noise**2 * period / window**3 / max(alpha, 1e-12)
-        if noisy < _NOISY or 1.25 * window > longest:
-            return smoothed, width, min(noisy, 1.0)
-        window *= 1.25
-
-
-def _foreign(signals: Signals) -> list[NDArray[np.float64]]:
-    """Return what references explain that can't belong to the channels: reversed, and shuffled in pieces."""
-    rng, rate = np.random.default_rng(0), signals.rate
-    pieces = np.array_split(rate, max(len(rate) // max(int(2.0 / signals.step), 1), 4))
-    others: list[NDArray[np.float64]] = [rate[::-1]]
-    for _ in range(_FOREIGN):
-        order = rng.permutation(len(pieces))
-        others.append(np.asarray(np.concatenate([pieces[place][:: rng.choice([1, -1])] for place in order])))
-    found = []
-    for other in others:
-        smoothed = smooth(np.asarray(other), signals.width)
-        functions = smooth(functions_of(smoothed, signals.step), signals.width)
-        angle = None if signals.angle is None else np.cumsum(other[:, 0]) * signals.step
-        foreign = replace(signals, functions=functions, rate=other, angle=angle)
-        one = align(foreign, most_rate_error=0.0, refine=False)
-        found.append(np.zeros(signals.readings.shape[1]) if one is None else one.explained)
-    return found
-
-
-def _levers(recording: Recording, found: Alignment, noisy: float) -> tuple[dict[str, Lever], list[str]]:
+def _levers(recording: Recording, found: Alignment) -> tuple[dict[str, Lever], list[str]]:
     """Return each tri-axial chip's distance from the axis by ω² and by α, and where the two disagree.
 
     The centripetal part points to the axis, the tangential one across it: they have one length and a right angle.
@@ -360,12 +269,12 @@ def _levers(recording: Recording, found: Alignment, noisy: float) -> tuple[dict[
     for chip, places in groups.items():
         if len(places) != 3:
             continue
-        by_rate, by_acceleration = found.coefficients[:, places]  # (3,) each, m
-        std = float(np.hypot(*np.linalg.norm(found.coefficient_std[:, places], axis=1)))
+        by_rate, by_acceleration = found.coefficients[1:3, places]  # (3,) each, m
+        std = float(np.hypot(*np.linalg.norm(found.coefficient_std[1:3, places], axis=1)))
         lengths = float(np.linalg.norm(by_rate)), float(np.linalg.norm(by_acceleration))
         levers[chip] = Lever(*lengths)
         largest = max(lengths)
-        allowed = _LEVERS * std + (_LEVER_SHARE + noisy) * largest
+        allowed = _LEVERS * std + _LEVER_SHARE * largest
         along = abs(float(by_rate @ by_acceleration)) / max(largest, 1e-12)
         if abs(lengths[0] - lengths[1]) > allowed:
             differ.append(f"chip {chip} is {lengths[0]:.3g} m off the axis by ω² and {lengths[1]:.3g} m by α")
@@ -378,15 +287,29 @@ def _joined(
     recording: Recording, reference: ReferenceSeries, found: Alignment, theirs: NDArray[np.float64]
 ) -> Recording:
     """Return the recording with the reference, read at ``theirs`` (m,), s, in the nearest rows, and its times."""
-    columns = dict(recording.reference)
+    columns, channels = dict(recording.reference), dict(zip(recording.channels, recording.readings.T, strict=True))
     for name, values in reference.columns.items():
+        if reference.channels and name in columns:
+            continue  # the first logger has its own
         columns[name], read = nearest_rows(recording.t_s, theirs, values)
         if name in TIME_COLUMNS:
             columns[TIME_COLUMNS[name]] = read
+    for name, values in zip(
+        chip_names(recording.channels, [*reference.channels]), reference.channels.values(), strict=True
+    ):
+        channels[name] = at_times(recording.t_s, theirs, values)
     facts = {
         "reference_offset_s": found.offset,
         "reference_offset_std_s": found.offset_std,
         "reference_rate_error": found.rate_error,
         "reference_rate_error_std": found.rate_error_std,
     }
-    return replace(recording, reference=columns, metadata={**recording.metadata, **facts})
+    metadata = {**recording.metadata, **facts}
+    joined = replace(
+        recording,
+        readings=np.column_stack([*channels.values()]),
+        channels=tuple(channels),
+        reference=columns,
+        metadata=metadata,
+    )
+    return joined.between(theirs[0], theirs[-1]) if reference.channels else joined

@@ -1,117 +1,55 @@
-"""A reference with times of its own: tachometer, encoder angle or gyro in a file that holds no channels."""
+"""A file with a clock of its own: a tachometer, encoder angle or gyro, or another logger with channels."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.integrate import cumulative_trapezoid
-from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
 from gfimu.base.errors import InputError
 from gfimu.base.files.input_file import is_there
+from gfimu.recording.formats import open_recording
 from gfimu.recording.importing import ColumnMap, load_map
 from gfimu.recording.importing.recognise import map_hint
+from gfimu.recording.joining.series import TABLE_COLUMNS, ReferenceSeries
 from gfimu.recording.mapped import mapped_reference
-from gfimu.recording.quantities import GYRO_COLUMNS, REFERENCE_UNITS
+from gfimu.recording.quantities import REFERENCE_UNITS
 from gfimu.recording.tables.column_file import open_columns
 
-__all__ = ["ReferenceSeries", "open_reference"]
+__all__ = ["open_reference"]
+
+_CHANNEL = re.compile(r"[A-Za-z]+[0-9]+_(m_s2|g|mg|lsb)")  # a column of a channel
 
 
-@dataclass(frozen=True)
-class ReferenceSeries:
-    """References on a clock of their own.
+def open_reference(
+    path: str | Path, column_map: ColumnMap | str | Path | None = None, else_by: ColumnMap | None = None
+) -> ReferenceSeries:
+    """Read a file of references or of another logger: columns as in a recording (``t_s`` …), or by a column map.
 
-    Parameters
-    ----------
-    source : str
-        Where they come from, for messages.
-    t_s : ndarray, shape (m,)
-        Times, s, strictly increasing.
-    columns : mapping of str to ndarray, shape (m,)
-        By their name in a recording, SI.
-    origin_s : float
-        Time on the file's clock at which ``t_s`` is zero, s.
-    """
-
-    source: str
-    t_s: NDArray[np.float64]
-    columns: Mapping[str, NDArray[np.float64]]
-    origin_s: float = 0.0
-
-    @property
-    def period(self) -> float:
-        """Median step of the times, s."""
-        return float(np.median(np.diff(self.t_s)))
-
-    def rate(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return times (k,) and the angular rate at them: (k, 1) about a table's axis, or (k, 3) of a gyro, rad/s.
-
-        Raises
-        ------
-        InputError
-            If there is neither a tachometer, an angle, a command nor a whole gyro.
-        """
-        for name in ("tacho_rad_s", "command_rad_s"):
-            if name in self.columns:
-                return self._known(self.columns[name][:, None])
-        if "angle_rad" in self.columns:
-            t, angle = self._known(self.columns["angle_rad"][:, None])
-            return t, CubicSpline(t, np.unwrap(angle[:, 0]))(t, 1)[:, None]
-        if all(name in self.columns for name in GYRO_COLUMNS):
-            return self._known(np.column_stack([self.columns[name] for name in GYRO_COLUMNS]))
-        raise InputError(
-            f"{self.source}: no angular rate among {', '.join(self.columns) or 'its columns'}; "
-            "a tachometer, angle, command or gyro of three axes is needed"
-        )
-
-    def angle(self) -> tuple[CubicHermiteSpline | None, float]:
-        """Return the angle of a table by time, rad, and its random walk by the noise of the rates, rad/√s.
-
-        None for a free body. The angle of an encoder has no random walk.
-        """
-        t, rate = self.rate()
-        if rate.shape[1] > 1:
-            return None, 0.0
-        if not any(name in self.columns for name in ("tacho_rad_s", "command_rad_s")):
-            angle = np.unwrap(self._known(self.columns["angle_rad"][:, None])[1][:, 0])
-            return CubicHermiteSpline(t, angle, rate[:, 0]), 0.0
-        angle = cumulative_trapezoid(rate[:, 0], t, initial=0.0)
-        return CubicHermiteSpline(t, angle, rate[:, 0]), self.rate_noise() * float(np.median(np.diff(t))) ** 0.5
-
-    def rate_noise(self) -> float:
-        """Return the noise of the angular rate, from sample to sample and by its rounding, rad/s."""
-        noise = 0.0
-        for rate in self.rate()[1].T:
-            steps = np.abs(np.diff(rate))
-            rounded = len(np.unique(rate)) < 0.5 * len(rate)
-            count = float(np.min(steps[steps > 0.0], initial=np.inf)) if rounded and steps.any() else 0.0
-            noise = max(noise, float(np.median(np.abs(np.diff(rate, 2)))) / (0.6745 * 6.0**0.5), count / 12.0**0.5)
-        return noise
-
-    def _known(self, values: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        rows = np.isfinite(values).all(axis=1)
-        if rows.sum() < 8:
-            raise InputError(f"{self.source}: only {int(rows.sum())} values of the reference; record longer")
-        return self.t_s[rows], values[rows]
-
-
-def open_reference(path: str | Path, column_map: ColumnMap | str | Path | None = None) -> ReferenceSeries:
-    """Read a file of references: columns as in a recording (``t_s``, ``tacho_rpm`` …), or by a column map.
+    ``else_by`` is the map of the channels' file, which may be that of this file too.
 
     Raises
     ------
     InputError
-        If the file can't be read, or holds no reference.
+        If the file can't be read, or holds neither a reference nor channels.
     """
     if column_map is not None:
-        chosen = load_map(column_map)
-        t, columns, origin = mapped_reference(path, chosen)
-        return ReferenceSeries(str(path), t, columns, origin)
+        return _without_channels(ReferenceSeries(str(path), *mapped_reference(path, load_map(column_map))))
+    try:
+        return _of_columns(path)
+    except InputError as error:
+        if else_by is None:
+            raise
+        try:
+            return open_reference(path, else_by)
+        except InputError:
+            raise error from None
+
+
+def _of_columns(path: str | Path) -> ReferenceSeries:
+    """Read a file whose columns are named as in a recording."""
     try:
         table = open_columns(path)
     except InputError as error:
@@ -123,6 +61,12 @@ def open_reference(path: str | Path, column_map: ColumnMap | str | Path | None =
         for unit, factor in units.items()
     }
     names = [name for name in table.names if name in factors and name != "t_s"]
+    if "t_s" in table.names and any(_CHANNEL.fullmatch(name) for name in table.names):
+        run = open_recording(path)
+        channels = dict(zip(run.channels, run.readings.T, strict=True))
+        origin = run.metadata.get("time_origin_s", 0.0)
+        origin_s = float(origin) if isinstance(origin, int | float) else 0.0
+        return _without_channels(ReferenceSeries(str(path), run.t_s, run.reference, origin_s, channels))
     if "t_s" not in table.names or not names:
         hint = map_hint(path)
         missing = (
@@ -138,3 +82,8 @@ def open_reference(path: str | Path, column_map: ColumnMap | str | Path | None =
     columns = {factors[name][0]: value * factors[name][1] for name, value in zip(names, values, strict=True)}
     origin = table.metadata.get("time_origin_s", 0.0)
     return ReferenceSeries(str(path), t, columns, float(origin) if isinstance(origin, int | float) else 0.0)
+
+
+def _without_channels(series: ReferenceSeries) -> ReferenceSeries:
+    """Return the series without channels where they hold a table's rate, which then stands for the motion alone."""
+    return replace(series, channels={}) if series.channels and set(TABLE_COLUMNS) & set(series.columns) else series
