@@ -118,6 +118,7 @@ if TYPE_CHECKING:
     from gfimu.commands.score import score as score
     from gfimu.commands.show import show as show
     from gfimu.commands.simulate import simulate as simulate
+    from gfimu.commands.start import start as start
     from gfimu.commands.tolerance import tolerance as tolerance
     from gfimu.commands.view import view as view
     from gfimu.diagnosis.design.proposal import Proposal as Proposal

@@ -13,7 +13,7 @@ from typing import Any
 __all__ = ["COMMANDS", "JOBS", "declared_commands", "help_line"]
 
 JOBS: dict[str, tuple[str, ...]] = {
-    "First steps": ("demo", "list", "show", "new", "schema"),
+    "First steps": ("demo", "start", "list", "show", "new", "schema"),
     "Bring a recording": ("inspect", "convert", "join", "record"),
     "Calibrate and estimate": ("calibrate", "certificate", "noise", "estimate", "impact", "live", "view"),
     "Find what a simulation gets wrong": ("check", "diagnose", "design", "benchmark"),

@@ -8,7 +8,7 @@ import re
 from gfimu.base.errors import UnitError
 from gfimu.base.units import STANDARD_GRAVITY
 
-__all__ = ["RATE", "TIME", "bracketed_unit", "factor_of", "kind_of", "unit_of_name"]
+__all__ = ["RATE", "TIME", "bracketed_unit", "factor_of", "kind_of", "last_word_unit", "unit_of_name"]
 
 _DEGREE = math.pi / 180.0
 
@@ -156,6 +156,12 @@ def bracketed_unit(name: str) -> tuple[str, str]:
     if found is None or not kind_of(found[1]):
         return plain, ""
     return plain[: found.start()].strip(), found[1].strip()
+
+
+def last_word_unit(name: str) -> str:
+    """Return the last word of a name where it is a unit that may mean anything else, as the g of ``ax_g``; else ""."""
+    last = re.split(f"[{_JOINTS}]", name.strip())[-1]
+    return last if last != name.strip() and last.lower() in _AMBIGUOUS and kind_of(last) else ""
 
 
 def unit_of_name(name: str) -> tuple[str, str]:

@@ -38,6 +38,7 @@ GYRO = ("gyro_x_rad_s", "gyro_y_rad_s", "gyro_z_rad_s")
 _AXIS = re.compile(r"(?<![b-z])[xyz](?![a-z])")
 _TACHO = re.compile(r"tacho|\brpm|omega|speed|ang\w* ?(vel|rate)|rotation(al)? (vel|rate)|\bspin\b|turntable")
 _ANGLE = re.compile(r"angle|theta|\bphi\b|encoder|rotation$|\bwinkel|angular pos|ang pos")
+_CARRIAGE = re.compile(r"carriage|stage\b|slide|toolhead|travel|position$|\bpos$|linear encoder")
 _TEMPERATURE = re.compile(r"temp(erature)?\b|\bdegc|imu temp")
 _OTHER_QUANTITY = re.compile(
     r"gps|cov\w*|\bstd|alpha$|beta$|gamma$|ground|wind|km ?h\b|mph|knots|steer|stamp"
@@ -169,6 +170,8 @@ def known_reference(name: str) -> tuple[str, str] | None:
     words, (plain, unit) = words_of(name), unit_of_name(name.lower())
     if _OTHER_QUANTITY.search(words) or (not unit and re.search(r"[\[(].*[\])]\s*$", plain)):
         return None
+    if kind_of(unit) == "length":
+        return ("carriage_m", unit) if _CARRIAGE.search(words) else None
     for key, mark in (("temperature_degC", _TEMPERATURE), ("angle_rad", _ANGLE), ("tacho_rad_s", _TACHO)):
         sure = unit == "rpm" or key == "temperature_degC"
         if kind_of(unit) == REFERENCE_KINDS[key] and (mark.search(words) or sure):

@@ -252,7 +252,7 @@ def _triad(table: RawTable, columns: tuple[str, str, str]) -> Triad:
     kind = max(kinds, key=lambda one: named.get(one, 0.0) + numbers.get(one, 0.0))
     by_name = max(kinds, key=lambda one: named.get(one, 0.0))
     why_not = f"its name is that of {by_name or 'something else'}" if kind != by_name and named else ""
-    is_sure = named.get(kind, 0.0) > _POLICY.letter
+    is_sure = named.get(kind, 0.0) >= _POLICY.letter
     gravity = unit is not None and unit.is_gravity and kind == "acceleration"
     is_usual = gravity and unit is not None and not any(unit.offset)
     return Triad(columns, kind, is_sure, gravity, is_usual, is_processed, why_not)

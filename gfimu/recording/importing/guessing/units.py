@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.base.units import STANDARD_GRAVITY
-from gfimu.recording.importing.notation import factor_of, unit_of_name
+from gfimu.recording.importing.notation import factor_of, kind_of, last_word_unit, unit_of_name
 from gfimu.recording.importing.raw_table import RawTable
 
 __all__ = [
@@ -26,6 +26,7 @@ __all__ = [
 
 _GRAVITY = {"m/s^2": 1.0, "g": STANDARD_GRAVITY, "mg": STANDARD_GRAVITY / 1e3, "mm/s^2": 1e-3, "cm/s^2": 1e-2}
 _RARE = {"mm/s^2", "cm/s^2"}  # units that hardly any logger writes
+_NEAR_IN_MOTION = 0.3  # relative, of gravity in the quietest pieces of a motion without rest
 NEAR = 0.08  # relative, of gravity at rest: gains of parts lie within
 _WINDOWS = 400  # pieces into which a triad is divided to look for rest
 _BEST, _AS_QUIET = 5, 3.0  # pieces that show how quiet rest is, and how many times that still counts as rest
@@ -131,6 +132,12 @@ def unit_of_acceleration(table: RawTable, columns: Sequence[str]) -> TriadUnit:
     usual = _usual_unit(values, length)
     if usual is not None:
         return usual
+    last = last_word_unit(columns[0])
+    if kind_of(last) == "acceleration":
+        size = length * factor_of(last, "acceleration")
+        is_near = abs(size / STANDARD_GRAVITY - 1.0) < _NEAR_IN_MOTION
+        why = f"the name ends in {last}; at rest {size:.3g} m/s²" + ("" if is_near else ", which is not gravity")
+        return TriadUnit(last, 1.0, zero, why, is_near, False)
     sphere = sphere_of(windows)
     if sphere is not None:
         centre, radius = sphere
