@@ -70,6 +70,7 @@ CALLS = {
     "view": {"file": "in.csv"},
     "optimize": {"chips": "4", "restarts": "1"},
     "demo": {},
+    "start": {"files": "in.csv", "array": "cube12", "out": "made"},
     "new": {"kind": "array", "out": "made.toml"},
     "schema": {"command": "score", "out": "made.json"},
     "tolerance": {"array": "cube12", "units": "10", "workers": "1"},

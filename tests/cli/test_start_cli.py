@@ -94,6 +94,8 @@ def test_a_table_with_a_tachometer_of_another_clock(tmp_path):
     assert float(clock.split("its clock is ")[1].split()[0]) == pytest.approx(3.7, abs=0.02)
     assert set(made.written) == {"run.parquet", "array.toml", "map.toml", "reference_map.toml", "twin.toml"}
     twin, run = Twin.load(tmp_path / "made" / "twin.toml"), gfimu.Recording.read(tmp_path / "made" / "run.parquet")
+    [seen] = gfimu.check(run, twin).runs
+    assert seen.fastest_rad_s == pytest.approx(4.5, abs=0.1)  # the tachometer has a value in one row of five
     [mounted] = chip_axes(run, twin)
     assert mounted.rms < 3.0 * 0.004 * G * np.sqrt(3.0)
 

@@ -37,6 +37,7 @@ __all__ = [
 
 CALLS = {
     "demo": "",
+    "start": "start turn.csv --rig table --array array.toml --out new_folder",
     "list": "list arrays",
     "show": "show twin.toml",
     "new": "new array --out new.toml",

@@ -270,7 +270,7 @@ def _times_of_reference(recording: Recording, model: WorldModel) -> list[str]:
 
 def _with_motion(seen: CheckedRun, run: Run, model: WorldModel, useful: UsefulRun) -> CheckedRun:
     """Return a recording with its rate, speeds and, of what turns, turns."""
-    known = np.isfinite(run.reference)
+    known = run.reference_valid
     t, drive = run.t[known], run.reference[known]
     place = drive if is_linear(model) else np.unwrap(drive)
     rate = np.gradient(place, t) if reads_place(model) else drive
