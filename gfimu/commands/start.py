@@ -23,7 +23,7 @@ from gfimu.base.errors import InputError, did_you_mean
 from gfimu.base.files.outputs import OutputFolder, check_outputs
 from gfimu.commands import given
 from gfimu.commands.shell.declare import Option, command
-from gfimu.commands.shell.options import MAX_MEMORY, file_argument
+from gfimu.commands.shell.options import MAX_MEMORY, PART, file_argument
 
 if TYPE_CHECKING:
     from gfimu.array.array import AccelerometerArray
@@ -46,7 +46,6 @@ FOLDER = OutputFolder(("run.parquet", "map.toml", "reference_map.toml", "array.t
 _FILES = file_argument("Files of one run: accelerometers, and a reference or further loggers.", "FILE...", list[Path])
 _OUT = Option("Folder to write; made where it is not there.", "DIR", writes=FOLDER)
 _RIG = Option(f"What moved: {', '.join(RIGS)}.")
-_PART = Option("Part of the chips, as adxl345; gfimu list parts has them.", "PART")
 _PLACE = Option("Place of a chip from the axis, or in the body; one for each chip.", "X,Y,Z m", kind=list[str])
 _RATE = Option("Sample rate, Hz, where the file states none.", "HZ")
 _YES = Option("Take guesses that are to be checked.")
@@ -109,7 +108,7 @@ def start(
     *,
     out: Annotated["str | Path | None", _OUT] = None,
     rig: Annotated[Rig | None, _RIG] = None,
-    part: Annotated[str | None, _PART] = None,
+    part: Annotated[str | None, PART.also(", as adxl345; gfimu list parts has them")] = None,
     place_m: Annotated["Sequence[str | Sequence[float]]", _PLACE] = (),
     rate_hz: Annotated[float | None, _RATE] = None,
     array: given.Array = None,
@@ -324,7 +323,12 @@ def _drawn(
 
     def with_places(places: Sequence[Any], axes: Sequence[Any]) -> AccelerometerArray:
         drawn = [
-            {"name": chip[0][:-1], "part": name, "position_m": [float(one) for one in place], "axes": np.round(turned, 6).tolist()}
+            {
+                "name": chip[0][:-1],
+                "part": name,
+                "position_m": [float(one) for one in place],
+                "axes": np.round(turned, 6).tolist(),
+            }
             for chip, place, turned in zip(chips, places, axes, strict=True)
         ]
         return AccelerometerArray.from_dict({"name": "array", "chip": drawn}, source="--place-m")

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from gfimu.base.errors import InputError
 from gfimu.commands import given
-from gfimu.commands.shell import completion, options
+from gfimu.commands.shell import options
 from gfimu.commands.shell.declare import Group, Option, command
 
 if TYPE_CHECKING:
@@ -31,7 +31,6 @@ _SHEET = "; else the data sheet's"
 
 _SCENARIO = options.SCENARIO.also("; by default rest, then a spin about the vertical", when="Motion. ")
 _NORMAL = Option("Limits are 3 σ of a normal distribution; else errors are uniform between them.")
-_PART = Option("Part of every chip, in place of those of the array.", "PART", offers=completion.parts)
 _CALIBRATED = Option(
     "none, rest, poses or poses+rest; may be repeated; all that are possible by default.",
     "NAME",
@@ -78,7 +77,7 @@ def tolerance(
     position_mm: Annotated[float, Option("Limit ± of each chip's place along each axis, mm.", "MM")] = 0.2,
     angle_deg: Annotated[float, Option("Limit ± of each chip's rotation about each axis, °.")] = 0.5,
     normal: Annotated[bool, _NORMAL] = False,
-    part: Annotated[str | None, _PART] = None,
+    part: Annotated[str | None, options.PART.also(", in place of those of the array")] = None,
     chip: Annotated["ChipErrors | None", _CHIP] = None,
     temperature_k: Annotated[float, Option("Temperature of the run less that of the calibration, K.")] = 5.0,
     calibrated: Annotated[Sequence[str], _CALIBRATED] = (),

@@ -32,6 +32,7 @@ CALLS = {
     "noise": "run.parquet",
     "show": "run.parquet",
     "simulate": "rest --out run.csv --set duration_s=400",
+    "start": "run.parquet --array cube12 --rig table --out begun",
     "view": "run.parquet --out run.rrd",
 }
 NEEDS = 8 * 13 * 40_000  # bytes of the recording

@@ -54,6 +54,7 @@ MAX_MEMORY = Option(
     "Memory that reading a file may take, as 2GB; by default four times its size and 500 MB", "SIZE", kind=str
 )
 NOISE_UG = Option("White noise of each channel, one-sided density, µg/√Hz", "UG")
+PART = Option("Part of every chip", "PART", offers=completion.parts)
 PICTURE = Option("Picture to write (.png, .svg, .pdf)", "FILE", writes=picture_file(".png", ".svg", ".pdf"))
 PORT = Option("Port of the board", "PORT")
 PROGRESS = Option("Called with the share done, 0 to 1, and a line of text", shell=False)
