@@ -12,6 +12,7 @@ gfimu start chips.csv tacho.csv --rig table --part adxl345
 gfimu start toolhead.csv moves.csv --rig axis --part adxl345 --rate-hz 3200
 """
 
+import math
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -64,7 +65,6 @@ _COLUMNS = {
     "carriage": "carriage_m",
     "gyro": "gyro_z_rad_s",
 }
-_HORIZONTAL = 1.5707963267948966
 
 
 @dataclass(frozen=True)
@@ -394,7 +394,7 @@ def _twin(recording: "Recording", kind: str, source: str, drawing: "Acceleromete
 
     content: dict[str, Any] = {"sample_rate_hz": float(f"{recording.sample_rate:.6g}"), "drive": {"source": source}}
     if kind == "pendulum":
-        content["axis_inclination_rad"] = _HORIZONTAL
+        content["axis_inclination_rad"] = math.pi / 2.0
     if kind != "body":
         content["cube_offset_m"] = [0.0, 0.0, 0.0]
     part = drawing.chips[0].part

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from gfimu.diagnosis.data.table.spins import State
     from gfimu.diagnosis.data.table.start_angle import gravity_angle
     from gfimu.diagnosis.data.time_grid import time_grid
+    from gfimu.diagnosis.design.chip_axes import chip_axes, chip_distance
     from gfimu.diagnosis.design.run_check import check_runs, turns_one_way
     from gfimu.diagnosis.diagnose import prepare
     from gfimu.diagnosis.fit.learn import predicted_by_reference, starting_point

@@ -9,7 +9,7 @@ __all__ = ["GuessPolicy", "SamplePolicy", "StampPolicy"]
 
 @dataclass(frozen=True)
 class GuessPolicy:
-    """Evidence for what columns of an unknown file are, natural logarithms of odds [nats].
+    """Evidence for what columns of an unknown file are: natural logarithms of odds [nats] where no other unit stands.
 
     Parameters
     ----------
@@ -29,8 +29,10 @@ class GuessPolicy:
         At rest the readings are near zero beside the largest, as rates are.
     constant : float
         The length at rest is the same throughout.
-    sure : float
-        By which a quantity is ahead of the next one so that nothing else is as likely.
+    near_in_motion : float
+        Relative distance from gravity of the quietest pieces of a motion without rest, in a unit of the name [ratio].
+    pose_lengths : float
+        Scatter of the lengths of poses, with the gains and biases of raw readings [ratio].
     """
 
     unit: float = 8.0
@@ -41,7 +43,8 @@ class GuessPolicy:
     poses: float = 3.0
     zero: float = 2.0
     constant: float = 1.0
-    sure: float = 1.5
+    near_in_motion: float = 0.3
+    pose_lengths: float = 0.2
 
 
 @dataclass(frozen=True)

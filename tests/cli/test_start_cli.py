@@ -11,7 +11,7 @@ import pytest
 
 import gfimu
 from gfimu import InputError
-from gfimu.diagnosis.design.chip_axes import chip_axes
+from gfimu.diagnosis import chip_axes
 from sim.twin import Twin
 
 G = 9.80665

@@ -2,7 +2,8 @@
 
 The twin predicts the specific force f at each chip in the body's axes; a chip reads A f with a rotation A, its sensing
 axes. A is the rotation that brings the predicted vectors nearest to the readings (W. Kabsch, Acta Cryst. A32, 1976,
-p. 922). Biases are small beside gravity. Where f stays in a plane the third axis follows from the right hand.
+p. 922). Each channel has a bias with a prior, so the means count no more than that allows. Where f stays in a plane the
+third axis follows from the right hand.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
+from gfimu.base.difference_noise import difference_noise
 from gfimu.diagnosis.data.run import prepare_run
 from gfimu.diagnosis.fit.learn import predicted_by_reference
 from gfimu.model.world_model import WorldModel
@@ -21,8 +23,28 @@ from gfimu.recording import Recording
 
 __all__ = ["Mounted", "chip_axes", "chip_distance"]
 
-_NEAR_SQUARE = 0.2  # rad, 11°: chips are soldered along the edges of a board, within what a twin can find as a tilt
-_LONGEST_M = 5.0  # m, of an arm or from an axis, that is searched
+
+@dataclass(frozen=True)
+class MountingPolicy:
+    """Numbers by which a mounting is found.
+
+    Parameters
+    ----------
+    near_square : float
+        Angle from a mounting along the rig's axes within which the chip is taken for mounted so [rad]. 11°: chips are
+        soldered along the edges of a board, and a smaller angle is what a diagnosis finds as an error of the mounting.
+    bias : float
+        Standard deviation of the bias of a channel [m/s²]. 50 mg: zero-g offsets of data sheets are 20 to 80 mg.
+    longest : float
+        Longest distance of a chip from the axis that is searched [m]. By choice: longer than the arm of any table.
+    """
+
+    near_square: float = 0.2
+    bias: float = 0.5
+    longest: float = 5.0
+
+
+_POLICY = MountingPolicy()
 
 
 @dataclass(frozen=True)
@@ -36,7 +58,7 @@ class Mounted:
     off_square_rad : float
         Angle from the nearest mounting along the body's axes, which ``axes`` is where this is small.
     rms : float
-        Distance of the readings from those predicted, m/s².
+        Distance of the readings from those predicted, without biases, m/s².
     """
 
     axes: NDArray[np.float64]
@@ -80,7 +102,8 @@ def chip_distance(recording: Recording, at: Callable[[float], WorldModel]) -> fl
     def misfit(distance: float) -> float:
         return _mounted(run.readings, near + distance * per_metre, run.valid)[0].rms
 
-    return float(minimize_scalar(misfit, bounds=(0.0, _LONGEST_M), method="bounded", options={"xatol": 1e-5}).x)
+    options = {"xatol": 1e-5}  # numerical: m
+    return float(minimize_scalar(misfit, bounds=(0.0, _POLICY.longest), method="bounded", options=options).x)
 
 
 def _mounted(readings: NDArray[np.float64], predicted: NDArray[np.float64], valid: NDArray[np.bool_]) -> list[Mounted]:
@@ -89,12 +112,17 @@ def _mounted(readings: NDArray[np.float64], predicted: NDArray[np.float64], vali
         three = slice(first, first + 3)
         rows = valid[:, three].all(axis=1)
         measured, expected = readings[rows, three], predicted[rows, three]
-        left, _, right = np.linalg.svd(measured.T @ expected)
+        middle, around = measured.mean(axis=0), expected.mean(axis=0)
+        noise = max(float(np.median([difference_noise(one) for one in measured.T])), 1e-6)  # numerical: ideal ones
+        weight = 1.0 / (1.0 / len(measured) + (_POLICY.bias / noise) ** 2)  # samples that the means count as
+        moment = (measured - middle).T @ (expected - around) + weight * np.outer(middle, around)
+        left, _, right = np.linalg.svd(moment)
         axes = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
         square = _nearest_square(axes)
         angle = float(np.arccos(np.clip(0.5 * (np.trace(axes @ square.T) - 1.0), -1.0, 1.0)))
-        rms = float(np.sqrt(np.mean(np.sum((measured - expected @ axes.T) ** 2, axis=1))))
-        found.append(Mounted(square if angle < _NEAR_SQUARE else axes, angle, rms))
+        misfit = (measured - middle) - (expected - around) @ axes.T
+        rms = float(np.sqrt(np.mean(np.sum(misfit**2, axis=1))))
+        found.append(Mounted(square if angle < _POLICY.near_square else axes, angle, rms))
     return found
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.recording.importing.notation import factor_of, kind_of, last_word_unit, unit_of_name
 from gfimu.recording.importing.raw_table import RawTable
+from gfimu.recording.policy import GuessPolicy
 
 __all__ = [
     "NEAR",
@@ -24,9 +25,9 @@ __all__ = [
     "unit_of_rate",
 ]
 
+_POLICY = GuessPolicy()
 _GRAVITY = {"m/s^2": 1.0, "g": STANDARD_GRAVITY, "mg": STANDARD_GRAVITY / 1e3, "mm/s^2": 1e-3, "cm/s^2": 1e-2}
 _RARE = {"mm/s^2", "cm/s^2"}  # units that hardly any logger writes
-_NEAR_IN_MOTION = 0.3  # relative, of gravity in the quietest pieces of a motion without rest
 NEAR = 0.08  # relative, of gravity at rest: gains of parts lie within
 _WINDOWS = 400  # pieces into which a triad is divided to look for rest
 _BEST, _AS_QUIET = 5, 3.0  # pieces that show how quiet rest is, and how many times that still counts as rest
@@ -35,7 +36,6 @@ _LOW_COUNTS = 20.0  # below that counts per g would be too coarse for any part
 _FASTEST_RAD_S = 40.0  # rad/s: beyond the range of nearly all gyros (2000 °/s is 35 rad/s)
 _ROUND = 0.03  # relative scatter of the poses about a sphere: gains of the axes differ by less
 _TURNED = 0.5  # of the radius, by which poses differ along each axis where they show a sphere
-_POSE_LENGTHS = 0.2  # relative scatter of the lengths of poses: with gains and biases of raw readings
 _POSES = 9  # rest poses from which offset and scale of raw counts follow
 _SCALES = {
     ("rad/s", 1.0): "rad/s",
@@ -108,7 +108,7 @@ def are_poses(rows: NDArray[np.float64]) -> bool:
     lengths = np.linalg.norm(rows, axis=1)
     usual = float(np.median(lengths))
     jumps = np.linalg.norm(np.diff(rows, axis=0), axis=1)
-    return bool(float(np.std(lengths)) < _POSE_LENGTHS * usual and float(np.median(jumps)) > _TURNED * usual)
+    return bool(float(np.std(lengths)) < _POLICY.pose_lengths * usual and float(np.median(jumps)) > _TURNED * usual)
 
 
 def _step(rows: NDArray[np.float64]) -> float:
@@ -135,7 +135,7 @@ def unit_of_acceleration(table: RawTable, columns: Sequence[str]) -> TriadUnit:
     last = last_word_unit(columns[0])
     if kind_of(last) == "acceleration":
         size = length * factor_of(last, "acceleration")
-        is_near = abs(size / STANDARD_GRAVITY - 1.0) < _NEAR_IN_MOTION
+        is_near = abs(size / STANDARD_GRAVITY - 1.0) < _POLICY.near_in_motion
         why = f"the name ends in {last}; at rest {size:.3g} m/s²" + ("" if is_near else ", which is not gravity")
         return TriadUnit(last, 1.0, zero, why, is_near, False)
     sphere = sphere_of(windows)
