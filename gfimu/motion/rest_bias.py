@@ -293,7 +293,7 @@ def estimate_from_rest(
     Estimate(cube12, integrate, 3000 samples, 29.99 s at 100 Hz)
     """
     findings = refuse_or_warn(doubts_of(recording, array), force=force)
-    recording = without_doubtful(recording, array, findings)
+    recording = without_doubtful(recording, array, [one for one in findings if one.kind != "frozen"])
     dead = dead_channels(findings)
     found = rest_bias(recording, array, gravity=gravity, without=dead)
     findings += refuse_or_warn(found.findings(), force=force)

@@ -166,7 +166,7 @@ def _usual_unit(values: NDArray[np.float64], length: float) -> TriadUnit | None:
         readings["1024 counts per g"] = 1024.0
     off = {name: abs(length / one - 1.0) for name, one in readings.items()}
     near = [name for name, distance in off.items() if distance < NEAR]
-    near.sort(key=lambda name: (name in _RARE, off[name]))
+    near.sort(key=lambda name: off[name] + _POLICY.rare * (name in _RARE))
     if not near:
         return None
     best, *others = near

@@ -122,7 +122,7 @@ def test_files_of_chips_on_one_clock_become_one_recording(tmp_path):
 def test_files_without_a_common_time_are_refused(tmp_path):
     first = files.klipper(tmp_path / "chip1.csv")
     second = files.klipper(tmp_path / "chip2.csv", start=9999.0)
-    with pytest.raises(InputError, match="no time in common"):
+    with pytest.raises(InputError, match="its clock is not that of"):
         mapped_recording([first, second], "klipper")
 
 
