@@ -70,7 +70,8 @@ def chip_part(number: int, chosen: RawTable, table: RawTable, triad: Triad, unit
     }
     roles = {name: f"{key}, {_scaled(unit)}" for key, name in zip(columns, triad.columns, strict=True)}
     where = f" of {elsewhere}" if elsewhere else ""
-    doubt = "; by its name a program has computed it from others" if triad.is_processed else ""
+    is_estimate = triad.is_processed and "grav" in f"{triad.columns[0]} {table.name}".lower()
+    doubt = "; by its name a program has computed it from others" if is_estimate else ""
     why = reason(f"chip a{number} ({', '.join(triad.columns)}{where}): {unit.why}{doubt}", unit.sure and not doubt)
     return Part(columns, {} if elsewhere else roles, (why,), (f"a{number}1",) if unit.sure else ())
 
