@@ -182,10 +182,23 @@ class _Answers:
             raise InputError(f"{question} State it with {option}")
         return default
 
+    def number(self, question: str, default: str, option: str) -> float:
+        """Return a positive number; raises `InputError` for any other answer."""
+        answer = self.text(question, default, option)
+        try:
+            found = float(answer)
+        except ValueError:
+            found = math.nan
+        if not 0.0 < found < math.inf:
+            raise InputError(f"{question} {answer!r} is no positive number; state it with {option}")
+        return found
+
     def choice(self, question: str, offers: Mapping[str, str], likely: str, option: str) -> str:
         """Return one of several words."""
         listed = "; ".join(f"{name}: {meaning}" for name, meaning in offers.items())
         found = self.text(f"{question} ({listed})", likely, option)
+        if found not in offers and self.ask is not None:
+            found = self.text(f"{found!r} is none of {', '.join(offers)}. {question}", likely, option)
         if found not in offers:
             raise InputError(f"{found!r} is none of {', '.join(offers)}{did_you_mean(found, offers)}; give {option}")
         return found
@@ -226,9 +239,7 @@ def _looked_at(
     doubts = [line.removesuffix(" (check this)") for line in seen.reasons if line.endswith("(check this)")]
     open_rate = [line for line in doubts if "only holds the place" in line]
     if open_rate:
-        rate = rate_hz or float(
-            answers.text(f"{path}: no sample rate. How many samples per second, Hz?", "", "--rate-hz")
-        )
+        rate = rate_hz or answers.number(f"{path}: no sample rate. How many samples per second, Hz?", "", "--rate-hz")
         found = msgspec.structs.replace(found, time=msgspec.structs.replace(found.time, rate_hz=rate))
     answers.confirm(path, [line for line in doubts if line not in open_rate])
     return seen, found
@@ -344,9 +355,9 @@ def _drawn(
                 return _twin(recording, kind, source, with_places([_arm(kind, distance)], square))
 
             distance = chip_distance(_named(recording, at(0.0).array), at)
-            asked = answers.text("Distance of the chip from the axis, m?", f"{distance:.4g}", "--place-m")
-            given_places = [_arm(kind, float(asked))]
-            found.append(f"the chip is {distance:.4g} m from the axis by its readings; {float(asked):.4g} m is taken")
+            taken = answers.number("Distance of the chip from the axis, m?", f"{distance:.4g}", "--place-m")
+            given_places = [_arm(kind, taken)]
+            found.append(f"the chip is {distance:.4g} m from the axis by its readings; {taken:.4g} m is taken")
     if len(given_places) != len(chips):
         raise InputError(
             f"{len(chips)} chips, {len(given_places)} places; give --place-m X,Y,Z for each, or --array FILE"

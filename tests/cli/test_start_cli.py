@@ -160,3 +160,22 @@ def test_files_without_accelerations_are_refused(tmp_path, gfimu_command):
     done = gfimu_command("start", tacho, "--out", tmp_path / "made")
     assert done.code == 2
     assert "no accelerations found" in done.stderr
+
+
+@pytest.mark.parametrize("answer", ["", "fast", "-5", "nan"])
+def test_an_answer_that_is_no_number_ends_in_one_line(answer, tmp_path):
+    rng = np.random.default_rng(1)
+    columns = [*readings(np.tile([0.0, 0.0, G], (2000, 1)), 2).T, rng.standard_normal(2000)]
+    path = rows(tmp_path / "no_rate.csv", "ax_g,ay_g,az_g,rpm", columns)
+    with pytest.raises(InputError, match="--rate-hz"):
+        gfimu.start(path, out=tmp_path / "made", ask=lambda *_: answer)
+    assert not (tmp_path / "made").exists()
+
+
+def test_a_word_that_is_none_of_the_offered_ones_is_asked_for_again(tmp_path):
+    answers = {"What moved": iter(["boat", "pendulum"])}
+
+    def answer(question, default):
+        return next((next(given) for words, given in answers.items() if words in question), default)
+
+    assert gfimu.start(pendulum(tmp_path), part="adxl345", out=tmp_path / "made", ask=answer).rig == "pendulum"

@@ -3,5 +3,5 @@
 In: times, readings and references of a recording, or columns of a table that is none yet; the array, where one is
 known.
 Out: `Doubt`s with their kind, severity, rows, channels and remedy, from which every command reports, and the recording
-without what is no reading.
+with wrong samples marked as missing.
 """

@@ -168,7 +168,7 @@ def dead_channels(doubts: Iterable[Doubt]) -> list[str]:
 
 
 def without_doubtful(recording: Recording, array: AccelerometerArray | None, doubts: Iterable[Doubt]) -> Recording:
-    """Return the recording with everything that is no reading (`Doubt.is_no_reading`) as missing, in SI or counts.
+    """Return the recording with wrong samples (`Doubt.is_no_reading`) marked as missing, in SI or counts.
 
     Parameters
     ----------

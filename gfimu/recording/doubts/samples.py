@@ -1,4 +1,4 @@
-"""Readings of channels that can be none or are wrong, by the readings alone."""
+"""Wrong samples of channels, found by the samples alone: corrupt, misread, frozen, clipped, dead, noisy."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from gfimu.recording.doubts.doubt import Doubt, rows_in_words
 from gfimu.recording.doubts.rails import is_within_range, rails_of
 from gfimu.recording.policy import SamplePolicy
 
-__all__ = ["chips_of", "frozen_rows", "sample_doubts", "sentinels_of", "typical_noise", "wrong_reads"]
+__all__ = ["chips_of", "frozen_rows", "least_step", "sample_doubts", "sentinels_of", "typical_noise", "wrong_reads"]
 
 _POLICY = SamplePolicy()
 _SENTINELS = (
@@ -140,7 +140,7 @@ def frozen_rows(values: NDArray[np.float64], noise: float) -> NDArray[np.intp]:
         return np.empty(0, dtype=np.intp)
     repeats = 1.0 - len(usual) / float(usual.sum())  # of readings that repeat the one before
     least = np.log(_POLICY.chance / len(values)) / np.log(max(repeats, _POLICY.least_repeats))
-    step = _step(values)
+    step = least_step(values)
     found = []
     for place in np.flatnonzero(lengths > max(least, _POLICY.longest_equal)):
         start, stop = int(edges[place]), int(edges[place + 1])
@@ -184,7 +184,7 @@ def wrong_reads(
     values = np.column_stack(list(chip.values()))  # (n, k)
     if len(values) < _POLICY.fewest:
         return []
-    noise = np.array([max(difference_noise(one[np.isfinite(one)]), 0.5 * _step(one)) for one in values.T])
+    noise = np.array([max(difference_noise(one[np.isfinite(one)]), 0.5 * least_step(one)) for one in values.T])
     rows = np.flatnonzero((_far(values, noise)).any(axis=1) | (values == 0.0).all(axis=1))
     for on in (on_rails or {}).values():
         rows = np.setdiff1d(rows, on if on is not None else [])
@@ -231,8 +231,8 @@ def _far(values: NDArray[np.float64], noise: NDArray[np.float64]) -> NDArray[np.
     return np.asarray((before * after < 0.0) & (least > _POLICY.apart * noise))
 
 
-def _step(values: NDArray[np.float64]) -> float:
-    """Return the least step between the readings of a channel, (n,), as that of counts."""
+def least_step(values: NDArray[np.float64]) -> float:
+    """Return the least difference between readings, in their unit: one count of what is not averaged."""
     steps = np.diff(np.unique(values[np.isfinite(values)]))
     return float(steps.min()) if len(steps) else 0.0
 

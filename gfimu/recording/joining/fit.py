@@ -18,7 +18,7 @@ from scipy.special import log_ndtr
 
 from gfimu.recording.joining.basis import Basis, Readings
 
-__all__ = ["Estimate", "Fit", "leaning", "refined"]
+__all__ = ["ClockEstimate", "Fit", "leaning", "refined"]
 
 _BLOCKS = 20  # of the overlap, whose scatter the standard deviations are of
 _LEAST_MOVED = 0.05  # of a block's gradient, that the fit to it leaves
@@ -39,7 +39,7 @@ _SHIFT, _RATE, _TACHO, _OTHERS = 0, 1, 2, 3
 
 
 @dataclass(frozen=True)
-class Estimate:
+class ClockEstimate:
     """What a fit found, with standard deviations of shift and rate error; fields as of `Alignment`."""
 
     std: tuple[float, float]
@@ -375,7 +375,7 @@ class Fit:
             bend[:, :size, :size] = 0.5 * (second.transpose(1, 0, 2) + second.transpose(1, 2, 0))
         return pull, bend
 
-    def estimate(self) -> Estimate:
+    def estimate(self) -> ClockEstimate:
         """Return what the fit found."""
         matrix = self.matrix()
         coefficients, inverse = self.solution(matrix)
@@ -390,7 +390,7 @@ class Fit:
         if self.rival is not None:
             std = np.hypot(std, np.abs(self.rival - self.at)[:2])
         by_chance = np.sqrt(np.einsum("cii->ic", inverse).clip(0.0) * self.variance(residual) / self.share)
-        return Estimate(
+        return ClockEstimate(
             (float(std[0]), float(std[1])), self.explained, self.share * self.counts, coefficients, by_chance,
             self.lost(matrix), self.odds_over_drift(matrix),
         )  # fmt: skip

@@ -71,7 +71,7 @@ def chip_part(number: int, chosen: RawTable, table: RawTable, triad: Triad, unit
     roles = {name: f"{key}, {_scaled(unit)}" for key, name in zip(columns, triad.columns, strict=True)}
     where = f" of {elsewhere}" if elsewhere else ""
     is_estimate = triad.is_processed and "grav" in f"{triad.columns[0]} {table.name}".lower()
-    doubt = "; by its name a program has computed it from others" if is_estimate else ""
+    doubt = "; by its name a program has computed it from others" if is_estimate else triad.why_not
     why = reason(f"chip a{number} ({', '.join(triad.columns)}{where}): {unit.why}{doubt}", unit.sure and not doubt)
     return Part(columns, {} if elsewhere else roles, (why,), (f"a{number}1",) if unit.sure else ())
 
@@ -127,7 +127,9 @@ def gyro_part(
     }
     roles = {name: f"gyro {axis}, {_scaled(unit)}" for axis, name in zip("xyz", triad.columns, strict=True)}
     where = f" of {elsewhere}" if elsewhere else ""
-    why = reason(f"gyro ({', '.join(triad.columns)}{where}): {unit.why}", unit.sure)
+    why = reason(
+        f"gyro ({', '.join(triad.columns)}{where}): {unit.why}{triad.why_not}", unit.sure and not triad.why_not
+    )
     return Part(columns, {} if elsewhere else roles, (why,), (GYRO[0],) if unit.sure else ())
 
 

@@ -38,6 +38,7 @@ from gfimu.recording.policy import GuessPolicy
 __all__ = ["Triad", "find_triads", "is_acceleration", "is_rate"]
 
 _NUMBERED = re.compile(r"(?P<before>.*?)(?P<number>\d+)(?P<after>\D*)")
+_ARTICLES = {"": "another quantity", "acceleration": "an acceleration", "rate": "a rate"}
 _AXES = (("x", "y", "z"), ("0", "1", "2"), ("1", "2", "3"))
 _ROUND = 0.1  # relative: by which the length at rest scatters where it is the same in all poses
 _NEAR_ZERO = 0.02  # of the largest reading
@@ -64,7 +65,7 @@ class Triad:
     is_processed : bool
         Whether the names are those of an acceleration that a program has computed from others.
     why_not : str
-        What in the numbers contradicts the names; empty if nothing does.
+        For a reason, where the numbers contradict the names; empty if they don't.
     """
 
     columns: tuple[str, str, str]
@@ -251,7 +252,9 @@ def _triad(table: RawTable, columns: tuple[str, str, str]) -> Triad:
     kinds = ("", "acceleration", "rate")  # of equal ones the first
     kind = max(kinds, key=lambda one: named.get(one, 0.0) + numbers.get(one, 0.0))
     by_name = max(kinds, key=lambda one: named.get(one, 0.0))
-    why_not = f"its name is that of {by_name or 'something else'}" if kind != by_name and named else ""
+    why_not = ""
+    if kind != by_name and named:
+        why_not = f"; its name is that of {_ARTICLES[by_name]}, its numbers are not"
     is_sure = named.get(kind, 0.0) >= _POLICY.letter
     gravity = unit is not None and unit.is_gravity and kind == "acceleration"
     is_usual = gravity and unit is not None and not any(unit.offset)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.base.units import STANDARD_GRAVITY
+from gfimu.recording.doubts.samples import least_step
 from gfimu.recording.importing.notation import factor_of, kind_of, last_word_unit, unit_of_name
 from gfimu.recording.importing.raw_table import RawTable
 from gfimu.recording.policy import GuessPolicy
@@ -97,7 +98,7 @@ def rest_windows(values: NDArray[np.float64]) -> NDArray[np.float64]:
     pieces = rows[: count * size].reshape(count, size, 3)
     means, scatter = pieces.mean(axis=1), pieces.std(axis=1).max(axis=1)
     best = float(np.sort(scatter)[min(_BEST, count) - 1])
-    still = max(_AS_QUIET * best, _STEP_SCATTER * _step(rows))
+    still = max(_AS_QUIET * best, _STEP_SCATTER * least_step(rows))
     return np.asarray(means[scatter <= min(float(np.quantile(scatter, 0.2)), still)])
 
 
@@ -109,12 +110,6 @@ def are_poses(rows: NDArray[np.float64]) -> bool:
     usual = float(np.median(lengths))
     jumps = np.linalg.norm(np.diff(rows, axis=0), axis=1)
     return bool(float(np.std(lengths)) < _POLICY.pose_lengths * usual and float(np.median(jumps)) > _TURNED * usual)
-
-
-def _step(rows: NDArray[np.float64]) -> float:
-    """Return the least step between readings, as that of counts."""
-    steps = np.diff(np.unique(rows))
-    return float(steps.min()) if len(steps) else 0.0
 
 
 def unit_of_acceleration(table: RawTable, columns: Sequence[str]) -> TriadUnit:

@@ -163,3 +163,13 @@ def test_numbered_columns_without_gravity_in_each_three_are_no_chips(tmp_path):
 def test_a_column_that_may_be_a_reference_is_pointed_out(tmp_path):
     reasons = inspect_file(board_of_numbered_columns(tmp_path / "board.csv")).reasons
     assert any(line.startswith("spd: not used; ") and 'tacho_rad_s = { column = "spd"' in line for line in reasons)
+
+
+def test_a_name_that_the_numbers_contradict_is_marked(tmp_path):
+    t, force, rates = field.hand()
+    head = "time_s,gyro_x,gyro_y,gyro_z,wx,wy,wz"
+    path = field.rows(tmp_path / "exchanged.csv", [head], [t, *(force / 9.80665).T, *rates.T])
+    found = inspect_file(path)
+    [reason] = [line for line in found.reasons if line.startswith("chip a1")]
+    assert "gravity in g; its name is that of a rate, its numbers are not (check this)" in reason
+    assert found.column_map.channels["a11"].column == "gyro_x"
