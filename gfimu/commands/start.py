@@ -19,9 +19,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
 from gfimu.base.declared import Declared, Line, figure
 from gfimu.base.errors import InputError, did_you_mean
 from gfimu.base.files.outputs import OutputFolder, check_outputs
+from gfimu.base.results import TableResult, text_column
 from gfimu.commands import given
 from gfimu.commands.shell.declare import Option, command
 from gfimu.commands.shell.options import MAX_MEMORY, PART, file_argument
@@ -68,7 +72,7 @@ _COLUMNS = {
 
 
 @dataclass(frozen=True)
-class Started(Declared):
+class Started(Declared, TableResult):
     """A recording of one's own with its array and twin, and what to do next."""
 
     folder: Annotated[str, figure("Folder that was written.")]
@@ -76,6 +80,13 @@ class Started(Declared):
     written: Annotated[tuple[str, ...], figure("Files in it.")]
     reasons: Annotated[tuple[str, ...], figure("What the files were taken for, and why.")]
     next_commands: Annotated[tuple[str, ...], figure("Commands to go on with.", key="next")]
+
+    def to_columns(self) -> dict[str, NDArray[np.object_]]:
+        """Return the commands to go on with, one row each."""
+        return {"next_command": text_column(self.next_commands)}
+
+    def _notes(self) -> tuple[str, ...]:
+        return self.reasons
 
     def shown(self) -> Iterator[Line]:
         """Yield what was read, what was written, and what to do next."""
@@ -294,8 +305,6 @@ def _one_recording(
 
 def _likely_rig(recording: "Recording") -> str:
     """Return the rig that the references suggest; empty where they suggest none."""
-    import numpy as np
-
     known = recording.reference
     if "carriage_m" in known:
         return "axis"
@@ -316,8 +325,6 @@ def _drawn(
     places: Sequence[str | Sequence[float]],
 ) -> "tuple[AccelerometerArray, list[str]]":
     """Return the array: as given, or with the places given or asked for and the axes that the readings show."""
-    import numpy as np
-
     from gfimu.array.array import AccelerometerArray
     from gfimu.commands.opened import as_array
     from gfimu.diagnosis.design.chip_axes import chip_axes, chip_distance
@@ -380,7 +387,6 @@ def _arm(kind: str, distance: float) -> list[float]:
 
 
 def _place(value: str | Sequence[float]) -> Any:
-    import numpy as np
 
     try:
         found = np.array([float(one) for one in (value.split(",") if isinstance(value, str) else value)])

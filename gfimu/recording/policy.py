@@ -32,7 +32,7 @@ class GuessPolicy:
     near_in_motion : float
         Relative distance from gravity of the quietest pieces of a motion without rest, in a unit of the name [ratio].
     rare : float
-        Distance from gravity by which a unit that hardly any logger writes has to be nearer [ratio]. A bias of 8 mg.
+        Distance from gravity by which a unit that hardly any logger writes has to be nearer [ratio]. A bias of 14 mg.
     pose_lengths : float
         Scatter of the lengths of poses, with the gains and biases of raw readings [ratio].
     """
@@ -46,7 +46,7 @@ class GuessPolicy:
     zero: float = 2.0
     constant: float = 1.0
     near_in_motion: float = 0.3
-    rare: float = 0.008
+    rare: float = 0.014
     pose_lengths: float = 0.2
 
 
