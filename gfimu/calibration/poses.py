@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from gfimu.array.array import AccelerometerArray
 from gfimu.base.errors import InputError, check_name
@@ -203,7 +203,7 @@ def table_fit(
     for _ in range(_POLICY.passes - 1):
         freedom, factor = (float(result.statistics[key]) for key in ("redundancy", "variance_factor"))
         if row_noise_m_s2 is not None:
-            agrees = not factor > chi2.isf(_POLICY.contradiction, freedom) / freedom
+            agrees = not factor > chdtri(freedom, _POLICY.contradiction) / freedom
             return result if agrees else fit(replace(poses, variance_factor=factor))
         if not freedom > 0.0:
             raise InputError(

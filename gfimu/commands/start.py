@@ -14,29 +14,25 @@ gfimu start toolhead.csv moves.csv --rig axis --part adxl345 --rate-hz 3200
 
 import math
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
-from gfimu.base.declared import Declared, Line, figure
 from gfimu.base.errors import InputError, did_you_mean
 from gfimu.base.files.outputs import OutputFolder, check_outputs
-from gfimu.base.results import TableResult, text_column
 from gfimu.commands import given
 from gfimu.commands.shell.declare import Option, command
 from gfimu.commands.shell.options import MAX_MEMORY, PART, file_argument
 
 if TYPE_CHECKING:
     from gfimu.array.array import AccelerometerArray
+    from gfimu.commands.started import Started
     from gfimu.recording import Recording
     from gfimu.recording.importing import ColumnMap, Inspection
     from sim.twin import Twin
 
-__all__ = ["FOLDER", "Started", "start"]
+__all__ = ["FOLDER", "start"]
 
 Rig = Literal["table", "pendulum", "axis", "body"]
 RIGS: dict[str, str] = {
@@ -71,31 +67,6 @@ _COLUMNS = {
 }
 
 
-@dataclass(frozen=True)
-class Started(Declared, TableResult):
-    """A recording of one's own with its array and twin, and what to do next."""
-
-    folder: Annotated[str, figure("Folder that was written.")]
-    rig: Annotated[str, figure("What moved.")]
-    written: Annotated[tuple[str, ...], figure("Files in it.")]
-    reasons: Annotated[tuple[str, ...], figure("What the files were taken for, and why.")]
-    next_commands: Annotated[tuple[str, ...], figure("Commands to go on with.", key="next")]
-
-    def to_columns(self) -> dict[str, NDArray[np.object_]]:
-        """Return the commands to go on with, one row each."""
-        return {"next_command": text_column(self.next_commands)}
-
-    def _notes(self) -> tuple[str, ...]:
-        return self.reasons
-
-    def shown(self) -> Iterator[Line]:
-        """Yield what was read, what was written, and what to do next."""
-        yield from (Line(f"- {line}") for line in self.reasons)
-        yield Line(f"wrote {', '.join(self.written)} in {self.folder}")
-        yield Line("Next:", style="bold")
-        yield from (Line(f"  {line}") for line in self.next_commands)
-
-
 def _run(options: Mapping[str, Any], as_json: bool) -> None:
     from gfimu.commands.shell.output import print_json
     from gfimu.commands.shell.printing import print_blocks
@@ -113,7 +84,7 @@ def _prompted(text: str, default: str) -> str:
     return str(typer.prompt(text, default=default or None))
 
 
-@command(run=_run, results=lambda: (Started,))
+@command(run=_run)
 def start(
     files: Annotated["str | Path | Sequence[str | Path]", _FILES],
     *,
@@ -127,7 +98,7 @@ def start(
     max_memory: Annotated[Any, MAX_MEMORY] = None,
     yes: Annotated[bool, _YES] = False,
     ask: Annotated[_Ask | None, _ASK] = None,
-) -> Started:
+) -> "Started":
     """Read files of one's own into a recording, with the map, the array and the twin that go with it.
 
     Axes of the chips, and the distance of a single chip from the axis, follow from the readings where they are not
@@ -144,6 +115,7 @@ def start(
     >>> gfimu.start("pendulum.csv", rig="pendulum", part="adxl355").next_commands  # doctest: +SKIP
     """
     from gfimu.base.files.atomic_file import write_text
+    from gfimu.commands.started import Started
 
     paths = [Path(files)] if isinstance(files, str | Path) else [Path(one) for one in files]
     folder = Path(out) if out is not None else paths[0].with_name(f"{paths[0].name.partition('.')[0]}-gfimu")
@@ -305,6 +277,8 @@ def _one_recording(
 
 def _likely_rig(recording: "Recording") -> str:
     """Return the rig that the references suggest; empty where they suggest none."""
+    import numpy as np
+
     known = recording.reference
     if "carriage_m" in known:
         return "axis"
@@ -325,6 +299,8 @@ def _drawn(
     places: Sequence[str | Sequence[float]],
 ) -> "tuple[AccelerometerArray, list[str]]":
     """Return the array: as given, or with the places given or asked for and the axes that the readings show."""
+    import numpy as np
+
     from gfimu.array.array import AccelerometerArray
     from gfimu.commands.opened import as_array
     from gfimu.diagnosis.design.chip_axes import chip_axes, chip_distance
@@ -387,6 +363,7 @@ def _arm(kind: str, distance: float) -> list[float]:
 
 
 def _place(value: str | Sequence[float]) -> Any:
+    import numpy as np
 
     try:
         found = np.array([float(one) for one in (value.split(",") if isinstance(value, str) else value)])

@@ -23,7 +23,6 @@ from gfimu.recording.importing.column_map import UNMAPPED, ColumnMap, load_map
 from gfimu.recording.importing.piece import Piece, combined_file, merged_piece, piece_of
 from gfimu.recording.importing.readers import read_foreign
 from gfimu.recording.importing.readers.tables import table_file
-from gfimu.recording.joining.series import ReferenceSeries, align_series
 from gfimu.recording.recording import Recording
 from gfimu.recording.tables.arrow import ArrowStream
 from gfimu.recording.tables.table_columns import TableColumns
@@ -137,6 +136,8 @@ def mapped_recording(
 
 def _refuse_another_clock(first: Piece, second: Piece) -> None:
     """Refuse two loggers whose readings agree at other times than their files state."""
+    from gfimu.recording.joining.series import ReferenceSeries, align_series
+
     one, other = (
         ReferenceSeries(
             piece.source,

@@ -9,7 +9,7 @@ few, each a hypothesis with its log odds over no relation at all.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
@@ -18,7 +18,7 @@ from scipy.fft import irfft, next_fast_len, rfft
 
 from gfimu.base.declared import Declared, figure
 from gfimu.recording.joining.basis import Basis, Readings
-from gfimu.recording.joining.fit import Fit, leaning, refined
+from gfimu.recording.joining.fit import Fit, leaning, mixed, refined
 
 __all__ = ["Alignment", "align"]
 
@@ -28,7 +28,7 @@ _MOST_RATES = 61  # of the grid of rate errors
 _PER_WIDTH = 8.0  # steps of the search per correlation time of the functions
 _MOST_STEPS = 20_000  # of the search, in both files together
 _CANDIDATES, _LIKELY = 5, 4  # offsets that are refined, and starts with gravity
-_ODDS = 30.0  # nats, by which the best offset has to beat the next, and drifts
+_ODDS = 100.0  # nats, by which the best offset has to beat the next, and drifts: foreign files reach 40, own ones 250
 _LOST = 0.2  # of the variance, on a quarter that the fit did not see
 
 
@@ -166,27 +166,35 @@ def align(readings: Readings, basis: Basis, *, most_rate_error: float = 0.02) ->
     if not fits:
         return None
     if basis.is_table:
-        likely = sorted((one for fit in fits for one in leaning(fit, readings)), key=lambda one: -one.odds_over(0.0))
-        fits = [one.settled() for one in likely[:_LIKELY]]
-    fits.sort(key=lambda one: one.rarity - one.odds_over(0.0))
+        likely = _likeliest([one.settled() for fit in fits for one in leaning(fit, readings)])
+        fits = [one.whole() for one in likely[:_LIKELY]]
+    fits = _likeliest(fits)
 
     def is_apart(one: Fit, other: Fit) -> bool:
         u = (other.middle - other.offset) / (1.0 + other.rate_error)
         return abs(one.offset + (1.0 + one.rate_error) * u - other.middle) > width
 
-    here = [one.whole() for one in fits if not is_apart(one, fits[0])]
-    best = min((one for one in here if not one.is_analogue), key=lambda one: one.misfit(), default=here[0])
-    for other in here:
-        if other.is_analogue and best is not other:
-            best = best.with_rival(other)
-    apart = [one for one in fits if is_apart(one, best)]
-    found = best.estimate()
+    lead = fits[0]
+    here = [one.like(lead) for one in fits if not is_apart(one, lead)]
+    kinds = [one for start in here for one in start.with_larger_walks()]
+    best, found = mixed(kinds)
+    other = [(one.surprise() - best.surprise(), one.offset) for one in kinds if is_apart(one, best)]
+    other += [(best.odds_over(one.explained), one.offset) for one in fits if is_apart(one, best)]
+    odds, second = min(other, default=(float("inf"), float("nan")))
     return Alignment(
-        best.offset, found.std[0], best.rate_error, found.std[1], best.length,
-        apart[0].offset if apart else float("nan"), best.odds_over(apart[0].explained) if apart else float("inf"),
+        best.offset, found.std[0], best.rate_error, found.std[1], best.length, second, odds,
         found.explained, found.independent, found.coefficients, found.coefficient_std, found.lost,
         best.at_bound, found.odds_of_motion, best.middle,
     )  # fmt: skip
+
+
+def _likeliest(fits: list[Fit]) -> list[Fit]:
+    """Return fits in the order of their odds over no relation, the best first.
+
+    The residual of a wrong offset is the signal, which is slow; so all are judged with the most independent residual.
+    """
+    share = np.max([one.share for one in fits], axis=0)
+    return sorted(fits, key=lambda one: -replace(one, share=share).odds_over(0.0))
 
 
 def _candidates(readings: Readings, basis: Basis, most: float, width: float) -> list[tuple[float, float]]:

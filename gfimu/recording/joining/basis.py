@@ -21,6 +21,7 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from gfimu.recording.doubts.rails import rails_of
+from gfimu.recording.doubts.samples import least_step
 
 __all__ = ["Basis", "Readings", "by_chip", "smoothed"]
 
@@ -62,7 +63,9 @@ class Basis:
             step = max(float(np.median(np.diff(t))), float(t[-1] - t[0]) / _MOST_ROWS)
             u = t[0] + step * np.arange(int((t[-1] - t[0]) / step) + 1)  # uneven stamps would bias the differences
             t, values = 0.5 * (u[1:] + u[:-1]), np.diff(CubicSpline(t, values)(u)) / step
-        u, smooth, noise = smoothed(t, values[:, None])
+            u, smooth, noise = smoothed(t, values[:, None])
+        else:
+            u, smooth, noise = smoothed(t, values[:, None], least_noise=least_step(values) / 12.0**0.5)
         angle = CubicSpline(u, smooth[:, 0]).antiderivative()
         functions = np.column_stack([angle(u, 1) ** 2, angle(u, 2)])
         walk = 0.0 if is_angle else float(noise[0]) * float(u[1] - u[0]) ** 0.5
@@ -192,9 +195,13 @@ class Readings:
 
 
 def smoothed(
-    t: NDArray[np.float64], values: NDArray[np.float64]
+    t: NDArray[np.float64], values: NDArray[np.float64], *, least_noise: float = 0.0
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Return uniform times (m,), s, smooth values (m, c) at them, and their noise (c,)."""
+    """Return uniform times (m,), s, smooth values (m, c) at them, and their noise (c,).
+
+    Cross-validation follows the stairs of slow values in coarse counts, whose errors are not independent; so the noise
+    is at least that of the rounding.
+    """
     step = max(float(np.median(np.diff(t))), float(t[-1] - t[0]) / _MOST_ROWS)
     u = t[0] + step * np.arange(int((t[-1] - t[0]) / step) + 1)
     place = np.clip(np.round((t - t[0]) / step).astype(int), 0, len(u) - 1)
@@ -213,7 +220,8 @@ def smoothed(
     shape = 1.0 / (1.0 + _PENALTIES[:, None] * squared**2)  # (penalties, m)
     freedom = (1.0 - shape).sum(axis=1)[:, None]
     missed = (1.0 - shape) ** 2 @ waves**2  # (penalties, c)
-    best = np.argmin(missed / freedom**2, axis=0)
+    too_near = missed / freedom < least_noise**2
+    best = np.argmin(np.where(too_near & ~too_near.all(axis=0), np.inf, missed / freedom**2), axis=0)
     noise = np.sqrt((missed / freedom)[best, np.arange(len(best))])
     return u, line + idctn(waves * shape[best].T, axes=[0], norm="ortho"), noise
 

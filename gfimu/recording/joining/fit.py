@@ -18,16 +18,17 @@ from scipy.special import log_ndtr
 
 from gfimu.recording.joining.basis import Basis, Readings
 
-__all__ = ["ClockEstimate", "Fit", "leaning", "refined"]
+__all__ = ["ClockEstimate", "Fit", "leaning", "mixed", "refined"]
 
 _BLOCKS = 20  # of the overlap, whose scatter the standard deviations are of
 _LEAST_MOVED = 0.05  # of a block's gradient, that the fit to it leaves
 _FLATTEST = 1e-6  # of a second derivative, in units of its diagonal
 _LEAST_FREEDOM = 4.0  # degrees, of a variance from few blocks
-_WALK = 6  # terms of the random walk of the angle
+_WALK = 12  # terms of the random walk of the angle
+_UNLIKELY = 1e-3  # share of all fits, below which one does not count
+_LARGER, _SIZES = 2.0, 3  # times, by which a walk is larger than the next, and how many are tried
 _GAIN = 0.01  # prior standard deviation of an analogue tachometer's gain, a ratio
 _SELDOM = float(np.log(9.0))  # nats: one tachometer in ten is analogue
-_SURE = 30.0  # nats by which that is decided: with residuals as correlated as here, ten come by chance
 _LEAST_WEIGHT = 1e-3  # of a clipped reading, below which it says nothing
 _AT_BOUND = 0.99  # of the largest rate error
 _PHASE = 0.7  # rad between tried rate errors, at the end that is further off
@@ -40,7 +41,7 @@ _SHIFT, _RATE, _TACHO, _OTHERS = 0, 1, 2, 3
 
 @dataclass(frozen=True)
 class ClockEstimate:
-    """What a fit found, with standard deviations of shift and rate error; fields as of `Alignment`."""
+    """What a fit found, with standard deviations (shift, s, and rate error); fields as of `Alignment`."""
 
     std: tuple[float, float]
     explained: NDArray[np.float64]
@@ -86,8 +87,6 @@ class Fit:
         Which of them are estimated.
     share : ndarray, shape (c,)
         Share of the rows that are independent.
-    rival : ndarray, shape (p,), optional
-        Parameters of another kind of tachometer that is not ruled out; the standard deviations cover it.
     """
 
     t: NDArray[np.float64]
@@ -106,7 +105,6 @@ class Fit:
     at: NDArray[np.float64]
     free: tuple[int, ...]
     share: NDArray[np.float64]
-    rival: NDArray[np.float64] | None = None
 
     @classmethod
     def of(
@@ -302,30 +300,37 @@ class Fit:
     def whole(self) -> Fit:
         """Return the least misfit by all parameters that are free and the random walk, from here on."""
         fit = replace(self, free=(*self.free, *range(_OTHERS, len(self.at))))
-        for _ in range(2):
-            fit = fit.solved().censored().weighted()
-        return fit
+        return fit.settled().settled()
 
-    @property
-    def is_analogue(self) -> bool:
-        """Whether the tachometer's gain is a parameter."""
-        return _TACHO in self.free
+    def like(self, other: Fit) -> Fit:
+        """Return the clocks and the kind of tachometer of this fit for the rows and the noise of another."""
+        shift = self.offset + (1.0 + self.rate_error) * other.middle_reference - other.middle
+        return replace(other, free=self.free, at=np.r_[shift, self.at[_RATE:]])
 
-    def with_rival(self, other: Fit) -> Fit:
-        """Return this fit, or that of an analogue tachometer in its place; the other is a rival where none is sure."""
-        gained = self.misfit() - replace(other, share=self.share).misfit() - other.rarity
-        if gained > _SURE:
-            return other
-        return replace(self, rival=other.at) if gained > 0.0 else self
+    def with_larger_walks(self) -> list[Fit]:
+        """Return the fits of a random walk as large as the noise of the rates makes it, and larger while that helps.
 
-    @property
-    def rarity(self) -> float:
-        """Log odds against an analogue tachometer before its data, and how much narrower its gain is now, nats."""
-        if not self.is_analogue:
-            return 0.0
-        precision = self.curvature()[1].sum(axis=0) + np.diag(self.prior[list(self.free)])
-        place = self.free.index(_TACHO)
-        return float(_SELDOM - 0.5 * np.log(np.linalg.pinv(precision)[place, place]) + np.log(_GAIN))
+        Rates between the samples of a tachometer are unknown too, and more so than its noise.
+        """
+        found = [self.solved()]
+        while len(self.at) > _OTHERS and len(found) < _SIZES:
+            fit = found[-1]
+            at = np.r_[fit.at[:_OTHERS], fit.at[_OTHERS:] / _LARGER]
+            larger = replace(fit, walk=_LARGER * fit.walk, at=at).solved()
+            if larger.surprise() > fit.surprise():
+                break
+            found.append(larger)
+        return found
+
+    def surprise(self) -> float:
+        """Return the negative log evidence, nats: of the data whatever the free parameters are, and of the tachometer.
+
+        It is that of a Gaussian about the least misfit (Laplace's approximation).
+        """
+        prior = self.prior[list(self.free)]
+        precision = self.curvature()[1].sum(axis=0) + np.diag(prior)
+        narrower = np.linalg.slogdet(precision)[1] - np.sum(np.log(prior[prior > 0.0]))
+        return self.misfit() + 0.5 * float(narrower) + (_SELDOM if _TACHO in self.free else 0.0)
 
     def slopes(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the derivatives of the residual at constant coefficients, projected as it is, (p, n, c), and it."""
@@ -358,7 +363,8 @@ class Fit:
             return np.add.reduceat(np.einsum("pnc,nc->np", slopes, scale * residual), blocks, axis=0), slopes
 
         pull, slopes = pulls(self)
-        bend = np.add.reduceat(np.einsum("pnc,qnc->npq", slopes, scale * slopes), blocks, axis=0)
+        pieces = [one.reshape(len(self.free), -1) for one in np.split(slopes * np.sqrt(scale), blocks[1:], axis=1)]
+        bend = np.stack([one @ one.T for one in pieces])
         if exact:
             size = self.free.index(_RATE) + 1 if _RATE in self.free else 1
             steps = [0.1 * self.step, 0.1 * self.step / self.length][:size]
@@ -387,8 +393,6 @@ class Fit:
         variance = np.maximum(_scattered(pull, bend, prior).diagonal(), stationary)[: len(self.free)]
         std = np.zeros(2)
         std[: min(2, len(self.free))] = np.sqrt(variance[:2])
-        if self.rival is not None:
-            std = np.hypot(std, np.abs(self.rival - self.at)[:2])
         by_chance = np.sqrt(np.einsum("cii->ic", inverse).clip(0.0) * self.variance(residual) / self.share)
         return ClockEstimate(
             (float(std[0]), float(std[1])), self.explained, self.share * self.counts, coefficients, by_chance,
@@ -440,6 +444,22 @@ def leaning(fit: Fit, readings: Readings) -> list[Fit]:
     plain = replace(Fit.of(readings, fit.basis, fit.offset, fit.rate_error, fit.most, leaning=True), share=fit.share)
     kinds = [plain.other_rates(), *([plain.other_gains()] if fit.basis.walk else [])]
     return [min(starts, key=lambda one: one.misfit()).weighted() for starts in kinds]
+
+
+def mixed(fits: list[Fit]) -> tuple[Fit, ClockEstimate]:
+    """Return the likeliest of fits to the same rows, and its estimate with the uncertainty of which one is right.
+
+    The variance is that of the mixture of all, by their evidence (J. Hoeting et al., Statistical Science 14, 1999).
+    """
+    surprise = np.array([one.surprise() for one in fits])
+    weight = np.exp(surprise.min() - surprise)
+    best = fits[int(np.argmax(weight))]
+    likely = [(one, share) for one, share in zip(fits, weight / weight.sum(), strict=True) if share > _UNLIKELY]
+    variance = sum(
+        share * (np.square(one.estimate().std) + (one.at - best.at)[[_SHIFT, _RATE]] ** 2) for one, share in likely
+    )
+    std = np.sqrt(variance)
+    return best, replace(best.estimate(), std=(float(std[0]), float(std[1])))
 
 
 def _scattered(pull: NDArray[np.float64], bend: NDArray[np.float64], prior: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
@@ -44,6 +45,11 @@ def _slow(rng, t: NDArray[np.float64], seconds: float) -> NDArray[np.float64]:
     knots = np.arange(t[0] - 4.0 * seconds, t[-1] + 5.0 * seconds, seconds)
     series = CubicSpline(knots, rng.standard_normal(len(knots)))(t)
     return series / series.std()
+
+
+def _integral(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the integral over the fine times; a sum alone would be half a step ahead, as long as a good clock's σ."""
+    return cumulative_trapezoid(values, dx=1.0 / FINE, initial=0.0)
 
 
 def table_rate(rng, profile: str, t: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -132,7 +138,7 @@ def draw_pair(rng, kind: str | None = None, *, other: bool = False, clip: bool |
     rate = table_rate(rng, profile, t)
     chips, lever = int(rng.choice([1, 2, 4])), _log(rng, 0.03, 0.3)
     lean = 9.81 * np.sin(np.radians(rng.uniform(0.0, 3.0)))
-    angle, alpha = np.cumsum(rate) / FINE, np.gradient(rate, 1.0 / FINE)
+    angle, alpha = _integral(rate), np.gradient(rate, 1.0 / FINE)
     channels = []
     for chip in range(chips):
         r, turn = lever * (1.0 + 0.5 * chip), rng.uniform(0.0, 2.0 * np.pi)
@@ -147,7 +153,7 @@ def draw_pair(rng, kind: str | None = None, *, other: bool = False, clip: bool |
     digital = rng.uniform() < 0.8  # it counts by its own clock
     tacho_noise = _log(rng, 0.003, 0.03)
     if kind == "angle":
-        measured = np.cumsum(turned)[:, None] / FINE
+        measured = _integral(turned)[:, None]
         theirs, seen = _sampled(rng, t, measured, min(rates[1], 200.0), 1e-3, 2.0 * np.pi / 4096, jitter)
         columns = {"angle_rad": seen[:, 0]}
     else:
@@ -165,7 +171,7 @@ def _free(rng, t, chips):
     turning = np.column_stack([rng.uniform(0.5, 3.0) * _slow(rng, t, rng.uniform(0.3, 1.0)) for _ in range(3)])
     turning *= (0.3 + np.abs(_slow(rng, t, 6.0)))[:, None]
     alpha = np.gradient(turning, 1.0 / FINE, axis=0)
-    steps = Rotation.from_rotvec(turning / FINE)
+    steps = Rotation.from_rotvec(0.5 * (turning + np.roll(turning, -1, axis=0)) / FINE)
     up = np.empty((len(t), 3))
     matrices = steps.as_matrix()
     now = np.array([0.0, 0.0, 9.81])

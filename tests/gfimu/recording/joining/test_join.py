@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import cumulative_trapezoid
 
 import gfimu
 from gfimu import AccelerometerArray, InputError
@@ -119,7 +120,7 @@ def leaning(clip, *, seed=1, swing=3.0, decay=0.0):
     """One chip 0.1 m off the axis of a table that leans by 3°, and its tachometer: offset 7 s, rate error -0.8 %."""
     rng, t = np.random.default_rng(seed), np.arange(0.0, 40.0, 0.005)
     rate = 7.0 + swing * np.sin(0.4 * t + 0.012 * t**2) - decay * t
-    alpha, angle = np.gradient(rate, t), np.cumsum(rate) * 0.005
+    alpha, angle = np.gradient(rate, t), cumulative_trapezoid(rate, t, initial=0.0)
     lean = 9.81 * np.sin(np.radians(3.0))
     readings = np.column_stack(
         [-0.1 * rate**2 + lean * np.cos(angle), 0.1 * alpha - lean * np.sin(angle), np.full(len(t), 9.8)]
@@ -155,7 +156,7 @@ def test_a_spin_up_and_a_long_decay_are_dated_within_their_uncertainty(seed):
     """One chip on a table that leans by 3°; the tachometer has a clock of its own: offset 4 s, rate error 0.3 %."""
     rng, t = np.random.default_rng(seed), np.arange(0.0, 60.0, 0.005)
     rate = np.interp(t, [6.0, 9.0, 60.0], [0.0, 12.0, 3.0])
-    alpha, angle = np.gradient(rate, t), np.cumsum(rate) * 0.005
+    alpha, angle = np.gradient(rate, t), cumulative_trapezoid(rate, t, initial=0.0)
     lean = 9.81 * np.sin(np.radians(3.0))
     readings = np.column_stack(
         [-0.1 * rate**2 + lean * np.cos(angle), 0.1 * alpha - lean * np.sin(angle), np.full(len(t), 9.8)]
