@@ -22,8 +22,7 @@ from gfimu.array.parts.limits import PartLimits
 from gfimu.base.errors import InputError, warn
 from gfimu.recording.carried_array import warn_of_other_array
 from gfimu.recording.doubts.doubt import Doubt
-from gfimu.recording.doubts.rails import rails_of
-from gfimu.recording.doubts.samples import chips_of, sample_doubts, typical_noise
+from gfimu.recording.doubts.samples import chips_of, rate_doubts, sample_doubts, typical_noise
 from gfimu.recording.doubts.stamps import stamp_doubts
 from gfimu.recording.evidence.explanation import explanations
 from gfimu.recording.evidence.gathering import gather
@@ -38,6 +37,7 @@ from gfimu.recording.recording import Recording
 __all__ = ["dead_channels", "doubts_of", "examine", "refuse_or_warn", "without_doubtful"]
 
 _FEWEST = 50  # samples
+_RATES = ("tacho_rad_s", *GYRO_COLUMNS)
 _ALIKE = 1.5  # ratio of the costs of two ways that can't be separated
 _AS_GOOD = 0.05  # of the contradiction is left: as good as nothing, whatever another way leaves
 _RATE_RATIO = 1.5  # between the rate by the times and the metadata's, for a refusal
@@ -154,7 +154,7 @@ def doubts_of(recording: Recording, array: AccelerometerArray | None = None) -> 
     """
     limits = None if array is None else _limits(recording, array)
     samples = _of_samples(recording, array, limits)
-    found = [*samples, *_of_gyro(recording), *stamp_doubts(recording.t_s)]
+    found = [*samples, *_of_rates(recording), *stamp_doubts(recording.t_s)]
     if array is not None and limits is not None and len(recording) >= _FEWEST:
         dead = dead_channels(samples)
         alive = np.array([name not in dead for name in array.channels])
@@ -208,14 +208,12 @@ def _of_samples(recording: Recording, array: AccelerometerArray | None, limits: 
     return sample_doubts(columns, chips_of(names), unit=unit, least_noise=floor)
 
 
-def _of_gyro(recording: Recording) -> list[Doubt]:
-    """Return the rails of a gyro."""
-    found = []
-    for name in GYRO_COLUMNS:
-        for rail in rails_of(recording.reference[name]) if name in recording.reference else ():
-            text = f"{name} reads its rail ({rail.level:.4g} rad/s) in {int(rail.on.sum())} samples"
-            found.append(Doubt("clipped", text, False, (name,), np.flatnonzero(rail.on), is_no_reading=True))
-    return found
+def _of_rates(recording: Recording) -> list[Doubt]:
+    """Judge the rates of a tachometer and a gyro; a table that keeps its largest speed is at no rail."""
+    found = [
+        one for name in _RATES if name in recording.reference for one in rate_doubts(name, recording.reference[name])
+    ]
+    return [one for one in found if one.kind != "clipped" or one.channels[0] in GYRO_COLUMNS]
 
 
 def _against_array(

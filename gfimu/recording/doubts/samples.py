@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,16 @@ from gfimu.recording.doubts.doubt import Doubt, rows_in_words
 from gfimu.recording.doubts.rails import is_within_range, rails_of
 from gfimu.recording.policy import SamplePolicy
 
-__all__ = ["chips_of", "frozen_rows", "least_step", "sample_doubts", "sentinels_of", "typical_noise", "wrong_reads"]
+__all__ = [
+    "chips_of",
+    "frozen_rows",
+    "least_step",
+    "rate_doubts",
+    "sample_doubts",
+    "sentinels_of",
+    "typical_noise",
+    "wrong_reads",
+]
 
 _POLICY = SamplePolicy()
 _SENTINELS = (
@@ -64,7 +74,7 @@ def sample_doubts(
         if not len(known):
             found.append(Doubt("dead", f"{name} has no readings: check its wiring", False, (name,)))
             continue
-        corrupt = present & (np.abs(values) > _POLICY.corrupt * (float(np.median(np.abs(known))) or 1.0))
+        corrupt = _corrupt(values)
         if corrupt.any():
             most = float(np.abs(values[corrupt]).max())
             text = f"{name}: {int(corrupt.sum())} values that can be no reading, up to {most:.3g}"
@@ -104,6 +114,16 @@ def sample_doubts(
         if axes:
             found += wrong_reads({name: columns[name] for name in axes}, {name: on_rails.get(name) for name in axes})
     return found
+
+
+def rate_doubts(name: str, values: NDArray[np.float64]) -> list[Doubt]:
+    """Return what is odd about a reference rate, (n,), rad/s: values that can be none, misread ones, and rails.
+
+    A pulse too few or too many makes half the rate or twice it. Rows without a value are those between its samples.
+    """
+    rows = np.flatnonzero(np.isfinite(values))
+    found = sample_doubts({name: values[rows]}, [[name]], unit="rad/s")
+    return [replace(one, rows=rows[one.rows]) for one in found if one.kind in {"corrupt", "wrong_read", "clipped"}]
 
 
 def chips_of(channels: Sequence[str]) -> list[list[str]]:
@@ -155,6 +175,12 @@ def _longest(rows: NDArray[np.intp]) -> int:
     """Return the largest number of rows in a row."""
     edges = np.flatnonzero(np.diff(rows, prepend=-2, append=rows[-1] + 2) != 1)
     return int(np.diff(edges).max())
+
+
+def _corrupt(values: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Mark values, (n,), that are too large for a measurement."""
+    usual = float(np.nanmedian(np.abs(values))) or 1.0
+    return np.asarray(np.abs(values) > _POLICY.corrupt * usual)
 
 
 def _noisy(noise: Mapping[str, float]) -> Iterator[Doubt]:
