@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from gfimu.base.errors import InputError
 from gfimu.recording.importing.column_map import TimeSpec
 from gfimu.recording.importing.dates import nanoseconds_of
-from gfimu.recording.importing.notation import factor_of
 from gfimu.recording.importing.raw_table import RawTable
+from gfimu.recording.units import factor_of
 
 __all__ = ["Times", "increasing_times", "parts_of", "times_of"]
 

@@ -14,7 +14,8 @@ from gfimu.base.errors import InputError, did_you_mean
 from gfimu.base.files.input_file import is_ordinary
 from gfimu.base.files.model_files import find_model, list_models, read_toml
 from gfimu.recording.importing.map_keys import FOR_ALL, complete, set_map_key
-from gfimu.recording.importing.notation import factor_of
+from gfimu.recording.quantities import REFERENCE_UNITS
+from gfimu.recording.units import factor_of, kind_of
 
 __all__ = [
     "REFERENCE_KINDS",
@@ -34,19 +35,7 @@ DropKind = Literal["corrupt", "out_of_range", "missing", "wrong_read", "duplicat
 """Rows that a map can leave out; see `gfimu.recording.filtered`."""
 
 REFERENCE_KINDS = {
-    "tacho_rad_s": "rate",
-    "command_rad_s": "rate",
-    "angle_rad": "angle",
-    "position_x_m": "length",
-    "position_y_m": "length",
-    "position_z_m": "length",
-    "carriage_m": "length",
-    "carriage_speed_m_s": "speed",
-    "carriage_acceleration_m_s2": "acceleration",
-    "temperature_degC": "temperature",
-    "gyro_x_rad_s": "rate",
-    "gyro_y_rad_s": "rate",
-    "gyro_z_rad_s": "rate",
+    f"{quantity}_{unit}": kind_of(unit) for quantity, (unit, *_) in REFERENCE_UNITS.items() if quantity != "t"
 }
 """References of a recording, and the kind of their unit."""
 

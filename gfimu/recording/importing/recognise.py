@@ -15,10 +15,10 @@ from gfimu.recording.importing.clock import times_of
 from gfimu.recording.importing.column_map import ColumnMap, list_maps, load_map
 from gfimu.recording.importing.guessing.times import RATES
 from gfimu.recording.importing.guessing.units import NEAR, rest_windows
-from gfimu.recording.importing.notation import bracketed_unit, factor_of, kind_of
 from gfimu.recording.importing.raw_table import RawFile, RawTable
 from gfimu.recording.importing.readers import read_foreign
 from gfimu.recording.quantities import READING_UNITS
+from gfimu.recording.units import bracketed_unit, factor_of, kind_of
 
 __all__ = ["fitting_maps", "map_hint", "own_chips"]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from gfimu.recording.importing.notation import unit_of_name
+from gfimu.recording.units import unit_of_name
 
 __all__ = ["ABSOLUTE", "ACCELERATION", "OTHER", "PROCESSED", "RATE", "WEAK_ACCELERATION", "WEAK_RATE", "words_of"]
 

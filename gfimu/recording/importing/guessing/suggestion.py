@@ -27,9 +27,9 @@ from gfimu.recording.importing.guessing.parts import (
 from gfimu.recording.importing.guessing.times import RATES, TimeGuess, find_time
 from gfimu.recording.importing.guessing.triads import Triad, find_triads
 from gfimu.recording.importing.guessing.units import are_poses, triad_values, unit_of_acceleration
-from gfimu.recording.importing.notation import factor_of
 from gfimu.recording.importing.raw_table import RawFile, RawTable
 from gfimu.recording.importing.splitting import find_split, split_file
+from gfimu.recording.units import factor_of
 
 __all__ = ["Suggestion", "roles_by_map", "suggest", "with_shipped"]
 

@@ -31,9 +31,9 @@ from gfimu.recording.importing.guessing.units import (
     triad_values,
     unit_of_acceleration,
 )
-from gfimu.recording.importing.notation import kind_of, unit_of_name
 from gfimu.recording.importing.raw_table import RawTable
 from gfimu.recording.policy import GuessPolicy
+from gfimu.recording.units import kind_of, unit_of_name
 
 __all__ = ["Triad", "find_triads", "is_acceleration", "is_rate"]
 

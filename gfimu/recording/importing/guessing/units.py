@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.recording.doubts.samples import least_step
-from gfimu.recording.importing.notation import factor_of, kind_of, last_word_unit, unit_of_name
 from gfimu.recording.importing.raw_table import RawTable
 from gfimu.recording.policy import GuessPolicy
+from gfimu.recording.units import factor_of, kind_of, last_word_unit, unit_of_name
 
 __all__ = [
     "NEAR",

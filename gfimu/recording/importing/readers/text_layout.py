@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from gfimu.recording.importing.notation import kind_of, unit_of_name
+from gfimu.recording.units import kind_of, unit_of_name
 
 __all__ = ["COMMENT_MARKS", "Layout", "cells_of", "layout_of", "trailer", "upright"]
 
