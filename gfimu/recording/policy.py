@@ -35,6 +35,11 @@ class GuessPolicy:
         Distance from gravity by which a unit that hardly any logger writes has to be nearer [ratio]. A bias of 14 mg.
     pose_lengths : float
         Scatter of the lengths of poses, with the gains and biases of raw readings [ratio].
+    exact_counts : float
+        Distance of gravity from a usual number of counts, beyond which an offset or another scale is as likely [ratio].
+        The gain and bias of most chips.
+    ratio_error : float
+        Error of the ratio of a gyro's numbers to the turn of gravity [nats]. Seen up to 0.067.
     """
 
     unit: float = 8.0
@@ -48,6 +53,8 @@ class GuessPolicy:
     near_in_motion: float = 0.3
     rare: float = 0.014
     pose_lengths: float = 0.2
+    exact_counts: float = 0.03
+    ratio_error: float = 0.07
 
 
 @dataclass(frozen=True)

@@ -132,6 +132,7 @@ def suggest(raw: RawFile, *, table: str = "", name: str = "map") -> Suggestion:
     force = next((force_of(*chip, unit) for chip, unit in zip(chips, units, strict=True) if chip[0] is chosen), None)
     gyro = gyro_part(raw, chosen, [one for one in triads if one.kind == "rate"], force, _sample_rate(chosen, time))
     taken = {*roles, *(name for part in (*parts, gyro) for name in part.roles)}
+    taken |= {name for one in triads if one.kind for name in one.columns}
     others = other_references(chosen, taken)
     parts += [gyro, others]
     reference = {**gyro.columns, **others.columns}

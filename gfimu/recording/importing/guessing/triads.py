@@ -98,7 +98,24 @@ def find_triads(table: RawTable, taken: Sequence[str] = ()) -> list[Triad]:
                     continue
                 used |= set(three)
                 found.append(triad)
-    return _chosen(found, named=True)
+    others = [name for short, name in free.items() if short not in used]
+    return _chosen([*found, *_of_one_stem(table, others)], named=True)
+
+
+def _of_one_stem(table: RawTable, names: Sequence[str]) -> list[Triad]:
+    """Return neighbours that are forces, or rates, by name and differ in one word, as roll, pitch and yaw."""
+    stems: dict[tuple[str, ...], list[str]] = {}
+    for name in names:
+        words = words_of(name).split()
+        for place in range(len(words)):
+            stem = (unit_of_name(name)[1], *words[:place], "", *words[place + 1 :])
+            stems.setdefault(stem, []).append(name)
+    threes = [three for three in stems.values() if len(three) == 3]
+    return [
+        _triad(table, (one, two, three))
+        for one, two, three in threes
+        if any(all(map(is_kind, (one, two, three))) for is_kind in (is_acceleration, is_rate))
+    ]
 
 
 def _threes_of(short: str) -> list[tuple[str, str, str]]:
@@ -269,7 +286,7 @@ def _evidence_of_names(words: str, table: str, unit: str) -> tuple[dict[str, flo
         found[kind] = found.get(kind, 0.0) + odds
 
     if unit:
-        kind = kind_of(unit)
+        kind = "field" if unit in {"G", "mG"} and OTHER.search(words) else kind_of(unit)  # gauss
         add(kind if kind in {"acceleration", "rate"} else "", _POLICY.unit)
     for text, odds in ((words, _POLICY.word), (table, _POLICY.table)):
         if text and RATE.search(text) and not re.search(r"uncal|temp|\bstd|\bcov", text):
@@ -302,6 +319,9 @@ def _evidence_of_numbers(table: RawTable, columns: tuple[str, str, str]) -> tupl
     is_sphere = sphere_of(windows) is not None
     if not is_constant and not is_sphere:
         return {"rate": _POLICY.zero}, None
+    whole = np.linalg.norm(values, axis=1)
+    if float(np.nanstd(whole)) < _STEADY * usual < _ROUND * usual < float(np.nanstd(values, axis=0).max()):
+        return {}, None  # that turns and is exactly as long throughout: a direction that a program has computed
     guess = unit_of_acceleration(table, columns)
     is_gravity = guess.is_gravity
     if not (is_gravity and not any(guess.offset)) and float(np.nanmax(np.nanstd(values, axis=0))) < _STEADY * usual:

@@ -42,6 +42,7 @@ _SCALES = {
     ("rad/s", 1.0): "rad/s",
     ("deg/s", 1.0): "°/s",
     ("deg/s", 1e-3): "m°/s",
+    ("mrad/s", 1.0): "mrad/s",
     **{("deg/s", 1.0 / counts): f"{counts:g} counts per °/s" for counts in (131.0, 65.5, 32.8, 16.4, 14.375)},
     **{("deg/s", 1e-3 * step): f"{step:g} m°/s per count" for step in (4.375, 8.75, 17.5, 35.0, 70.0)},
 }
@@ -146,7 +147,7 @@ def unit_of_acceleration(table: RawTable, columns: Sequence[str]) -> TriadUnit:
         power = 2.0 ** round(math.log2(length))
         if abs(length / power - 1.0) < NEAR and _are_whole(values):
             why = f"at rest its length is {length:.5g}: {power:g} counts per g"
-            return TriadUnit("g", 1.0 / power, zero, why, True)
+            return TriadUnit("g", 1.0 / power, zero, why, abs(length / power - 1.0) < _POLICY.exact_counts)
         why = f"at rest its length is {length:.5g}, taken as 1 g; the data sheet has the exact scale"
         return TriadUnit("g", 1.0 / length, zero, why, False, False)
     return TriadUnit(
@@ -230,7 +231,7 @@ def unit_of_rate(
         others = [
             word
             for key, word in _SCALES.items()
-            if word != words and abs(_log_ratio(key, turn) - _log_ratio((unit, scale), turn)) < 0.03
+            if word != words and abs(_log_ratio(key, turn) - _log_ratio((unit, scale), turn)) < _POLICY.ratio_error
         ]
         why = f"gravity turns as these rates do in {words} (ratio {ratio:.3f})"
         why += f"; {' or '.join(others)} is as likely" if others else ""

@@ -130,7 +130,8 @@ def _of_records(records: list[Any], name: str) -> Iterator[tuple[str, RawTable]]
     if len(kinds) < 2 or len(shared) >= _SAME_KIND * max(map(len, kinds)):
         kinds = []  # keys are left out here and there
     for group in [[row for row in rows if row.keys() == keys] for keys in kinds] or [rows]:
-        own = next((key for key in group[0] if kinds and key not in shared), "").partition(".")[0]
+        own = next((key for key in group[0] if kinds and key not in shared), "")
+        own = own.partition("[")[0] if "[" in own else own.rpartition(".")[0] or own
         label = f"{name} {own}".strip()
         keys = dict.fromkeys(key for row in group for key in row)
         yield label, _table(label, {key: [row.get(key) for row in group] for key in keys})

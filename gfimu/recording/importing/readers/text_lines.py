@@ -24,6 +24,7 @@ _MARKED = re.compile(
 )
 _SPACED = re.compile(rf"({_LABEL})\s{{1,9}}{_REALS}")
 _BRACKETED = re.compile(r"^\s*[\[({][^A-Za-z\"]*[\])}]\s*,?\s*$")
+_VECTORS = re.compile(r"\d\t[^,\t]+,[^,\t]+,")
 _CHECKED = re.compile(r"\*[0-9A-Fa-f]{2}\s*$")
 _STAMP = re.compile(rf"({_DATE}\d{{1,2}}:\d\d:\d\d(?:[.,:]\d+)?)(?:,\d{{3}})*")
 _PLOTTED = re.compile(r"^>([A-Za-z_][\w.]*):(\d+(?:\.\d+)?):([+-]?[\d.]+(?:[eE][+-]?\d+)?)")
@@ -64,6 +65,8 @@ def _without_frames(lines: list[str]) -> list[str]:
         return [_PLOTTED.sub(r"I (\2) \1:\3", line) for line in lines if _PLOTTED.match(line)]
     if _most(lines, _BRACKETED):
         return [re.sub(r"[\[\](){}]", "", line) if _BRACKETED.search(line) else line for line in lines]
+    if _most(lines, _VECTORS):
+        return [line.replace("\t", ",") for line in lines]
     if _most(lines, _CHECKED):
         return [_CHECKED.sub("", line) for line in lines]
     return lines
