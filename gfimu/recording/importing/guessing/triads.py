@@ -39,6 +39,7 @@ __all__ = ["Triad", "find_triads", "is_acceleration", "is_rate"]
 
 _NUMBERED = re.compile(r"(?P<before>.*?)(?P<number>\d+)(?P<after>\D*)")
 _ARTICLES = {"": "another quantity", "acceleration": "an acceleration", "rate": "a rate"}
+_ANGLES = ("roll", "pitch", "yaw")  # about x, y and z
 _AXES = (("x", "y", "z"), ("0", "1", "2"), ("1", "2", "3"))
 _ROUND = 0.1  # relative: by which the length at rest scatters where it is the same in all poses
 _NEAR_ZERO = 0.02  # of the largest reading
@@ -66,6 +67,10 @@ class Triad:
         Whether the names are those of an acceleration that a program has computed from others.
     why_not : str
         For a reason, where the numbers contradict the names; empty if they don't.
+    unit : (str, float)
+        Unit and scale by which the length at rest is gravity.
+    off : float
+        Relative distance of that length from gravity.
     """
 
     columns: tuple[str, str, str]
@@ -75,6 +80,8 @@ class Triad:
     is_usual: bool = False
     is_processed: bool = False
     why_not: str = ""
+    unit: tuple[str, float] = ("", 1.0)
+    off: float = 0.0
 
 
 def find_triads(table: RawTable, taken: Sequence[str] = ()) -> list[Triad]:
@@ -110,12 +117,16 @@ def _of_one_stem(table: RawTable, names: Sequence[str]) -> list[Triad]:
         for place in range(len(words)):
             stem = (unit_of_name(name)[1], *words[:place], "", *words[place + 1 :])
             stems.setdefault(stem, []).append(name)
-    threes = [three for three in stems.values() if len(three) == 3]
-    return [
-        _triad(table, (one, two, three))
-        for one, two, three in threes
-        if any(all(map(is_kind, (one, two, three))) for is_kind in (is_acceleration, is_rate))
-    ]
+    found = []
+    for three in stems.values():
+        if len(three) == 3 and any(all(map(is_kind, three)) for is_kind in (is_acceleration, is_rate)):
+            angles = [next((angle for angle in _ANGLES if angle in words_of(name)), "") for name in three]
+            first, second, third = sorted(
+                three, key=lambda name: _ANGLES.index(angles[three.index(name)] or _ANGLES[0])
+            )
+            why = "" if all(angles) else "; which of them is x, y and z is a guess"
+            found.append(replace(_triad(table, (first, second, third)), why_not=why))
+    return found
 
 
 def _threes_of(short: str) -> list[tuple[str, str, str]]:
@@ -226,12 +237,15 @@ def _chosen(triads: list[Triad], *, named: bool) -> list[Triad]:
         return [replace(one, kind="") if one.is_processed or (named and not one.by_name) else one for one in triads]
     raw = any(not one.is_processed for one in showing)
     usual = any(one.is_usual for one in showing)
+    best = min(showing, key=lambda one: one.off)
     found = []
     for one in triads:
         if one.is_processed and one.kind == "acceleration" and (raw or not one.shows_gravity):
             found.append(replace(one, kind=""))
         elif one in showing and usual and not one.is_usual and not one.by_name:
             found.append(replace(one, kind=""))  # of constant length without being gravity: a magnetic field
+        elif one in showing and not named and one.unit != best.unit and one.off > _POLICY.exact_counts:
+            found.append(replace(one, kind=""))  # beside a chip that shows gravity in another unit
         elif one.kind == "acceleration" and not one.shows_gravity and not one.by_name:
             found.append(replace(one, kind="rate"))
         else:
@@ -275,7 +289,8 @@ def _triad(table: RawTable, columns: tuple[str, str, str]) -> Triad:
     is_sure = named.get(kind, 0.0) >= _POLICY.letter
     gravity = unit is not None and unit.is_gravity and kind == "acceleration"
     is_usual = gravity and unit is not None and not any(unit.offset)
-    return Triad(columns, kind, is_sure, gravity, is_usual, is_processed, why_not)
+    found = Triad(columns, kind, is_sure, gravity, is_usual, is_processed, why_not)
+    return found if unit is None else replace(found, unit=(unit.unit, unit.scale), off=unit.off)
 
 
 def _evidence_of_names(words: str, table: str, unit: str) -> tuple[dict[str, float], bool]:
@@ -319,9 +334,8 @@ def _evidence_of_numbers(table: RawTable, columns: tuple[str, str, str]) -> tupl
     is_sphere = sphere_of(windows) is not None
     if not is_constant and not is_sphere:
         return {"rate": _POLICY.zero}, None
-    whole = np.linalg.norm(values, axis=1)
-    if float(np.nanstd(whole)) < _STEADY * usual < _ROUND * usual < float(np.nanstd(values, axis=0).max()):
-        return {}, None  # that turns and is exactly as long throughout: a direction that a program has computed
+    if max(abs(usual - 1.0), float(np.std(lengths))) < _POLICY.unit_vector:
+        return {}, None  # a direction or a part of a quaternion, which a program has computed
     guess = unit_of_acceleration(table, columns)
     is_gravity = guess.is_gravity
     if not (is_gravity and not any(guess.offset)) and float(np.nanmax(np.nanstd(values, axis=0))) < _STEADY * usual:

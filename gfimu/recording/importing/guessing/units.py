@@ -71,6 +71,8 @@ class TriadUnit:
         Whether gravity at rest is that of a usual unit, a usual number of counts, or of a sphere of poses.
     agreement : float
         Of rates: correlation of what gravity turns by with what they would turn it by; 0 where that is not known.
+    off : float
+        Of accelerations in a usual unit: relative distance of the length at rest from gravity.
     """
 
     unit: str
@@ -80,6 +82,7 @@ class TriadUnit:
     sure: bool
     is_gravity: bool = True
     agreement: float = 0.0
+    off: float = 0.0
 
 
 def triad_values(table: RawTable, columns: Sequence[str]) -> NDArray[np.float64]:
@@ -142,7 +145,7 @@ def unit_of_acceleration(table: RawTable, columns: Sequence[str]) -> TriadUnit:
             offset = (float(centre[0]), float(centre[1]), float(centre[2]))
             where = ", ".join(f"{one:.6g}" for one in centre)
             why = f"rest poses lie on a sphere about {where} of radius {radius:.6g} counts"
-            return TriadUnit("g", 1.0 / radius, offset, why, True)
+            return TriadUnit("g", 1.0 / radius, offset, why, _are_whole(values))
     if _LOW_COUNTS < length < math.inf:
         power = 2.0 ** round(math.log2(length))
         if abs(length / power - 1.0) < NEAR and _are_whole(values):
@@ -173,7 +176,7 @@ def _usual_unit(values: NDArray[np.float64], length: float) -> TriadUnit | None:
         else f"at rest {length:.4g}: {best}"
     )
     why += f"; {' or '.join(others)} is possible" if others else ""
-    return TriadUnit(unit, scale, (0.0, 0.0, 0.0), why, not others)
+    return TriadUnit(unit, scale, (0.0, 0.0, 0.0), why, not others, off=off[best])
 
 
 def _are_whole(values: NDArray[np.float64]) -> bool:
