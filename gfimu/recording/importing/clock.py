@@ -49,6 +49,11 @@ class Times:
     notes: tuple[str, ...]
     dropped: Mapping[str, int] = field(default_factory=dict)
 
+    @property
+    def rate_hz(self) -> float:
+        """Sample rate, Hz: one by the median step; NaN of fewer than two samples."""
+        return 1.0 / float(np.median(np.diff(self.t_s))) if len(self.t_s) > 1 else float("nan")
+
 
 def times_of(table: RawTable, spec: TimeSpec, source: str, *, drop: Collection[str] = ()) -> Times:
     """Return the times of a table's rows.

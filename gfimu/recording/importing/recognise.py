@@ -123,10 +123,9 @@ def _plausibility(raw: RawFile, column_map: ColumnMap) -> int | None:
         if column_map.text.columns and not gravity:
             return None  # without names gravity alone speaks for a map
         try:
-            t = times_of(table, column_map.time, raw.source).t_s
+            rate = times_of(table, column_map.time, raw.source).rate_hz
         except InputError:
             return 2 * gravity
-        rate = 1.0 / float(np.median(np.diff(t))) if len(t) > 1 else 0.0
         return 2 * gravity + (RATES[0] <= rate <= RATES[1])
     return 0
 

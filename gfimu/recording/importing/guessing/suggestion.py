@@ -272,7 +272,7 @@ def _sample_rate(table: RawTable, time: TimeGuess) -> float | None:
     if not time.is_rate_known:
         return None
     try:
-        t = times_of(table, time.spec, "").t_s
+        rate = times_of(table, time.spec, "").rate_hz
     except InputError:
         return None
-    return 1.0 / float(np.median(np.diff(t))) if len(t) > 1 else None
+    return rate if np.isfinite(rate) else None

@@ -14,16 +14,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.recording.importing.guessing.names import (
-    ABSOLUTE,
-    ACCELERATION,
-    OTHER,
-    PROCESSED,
-    RATE,
-    WEAK_ACCELERATION,
-    WEAK_RATE,
-    words_of,
-)
+from gfimu.recording.importing.guessing.names import OTHER, evidence_of_names, is_acceleration, is_rate, words_of
 from gfimu.recording.importing.guessing.units import (
     TriadUnit,
     rest_windows,
@@ -35,7 +26,7 @@ from gfimu.recording.importing.raw_table import RawTable
 from gfimu.recording.policy import GuessPolicy
 from gfimu.recording.units import kind_of, unit_of_name
 
-__all__ = ["Triad", "find_triads", "is_acceleration", "is_rate"]
+__all__ = ["Triad", "find_triads"]
 
 _NUMBERED = re.compile(r"(?P<before>.*?)(?P<number>\d+)(?P<after>\D*)")
 _ARTICLES = {"": "another quantity", "acceleration": "an acceleration", "rate": "a rate"}
@@ -253,24 +244,6 @@ def _chosen(triads: list[Triad], *, named: bool) -> list[Triad]:
     return found
 
 
-def is_acceleration(name: str) -> bool:
-    """Whether a column is an acceleration along one axis by its unit or its name."""
-    words, unit = words_of(name), unit_of_name(name)[1]
-    if OTHER.search(words) or RATE.search(words) or PROCESSED.search(words) or ABSOLUTE.search(words):
-        return False
-    if unit:
-        return kind_of(unit) == "acceleration"
-    return bool(ACCELERATION.search(words) or WEAK_ACCELERATION.match(words))
-
-
-def is_rate(name: str) -> bool:
-    """Whether a column is an angular rate by its unit or its name."""
-    words, unit = words_of(name), unit_of_name(name)[1]
-    if OTHER.search(words) and not RATE.search(words):
-        return False
-    return kind_of(unit) == "rate" if unit else bool(RATE.search(words) or WEAK_RATE.match(words))
-
-
 def _short(name: str) -> str:
     return unit_of_name(name)[0].lower()
 
@@ -278,7 +251,7 @@ def _short(name: str) -> str:
 def _triad(table: RawTable, columns: tuple[str, str, str]) -> Triad:
     """Return three columns with what they measure by all evidence: unit, words, the table's name, and the numbers."""
     words = words_of(columns[0]) if table.named else ""
-    named, is_processed = _evidence_of_names(words, words_of(table.name), unit_of_name(columns[0])[1])
+    named, is_processed = evidence_of_names(words, words_of(table.name), unit_of_name(columns[0])[1])
     numbers, unit = _evidence_of_numbers(table, columns)
     kinds = ("", "acceleration", "rate")  # of equal ones the first
     kind = max(kinds, key=lambda one: named.get(one, 0.0) + numbers.get(one, 0.0))
@@ -291,34 +264,6 @@ def _triad(table: RawTable, columns: tuple[str, str, str]) -> Triad:
     is_usual = gravity and unit is not None and not any(unit.offset)
     found = Triad(columns, kind, is_sure, gravity, is_usual, is_processed, why_not)
     return found if unit is None else replace(found, unit=(unit.unit, unit.scale), off=unit.off)
-
-
-def _evidence_of_names(words: str, table: str, unit: str) -> tuple[dict[str, float], bool]:
-    """Return log odds of what a column measures by its name and that of its table, and whether it was computed."""
-    found: dict[str, float] = {}
-
-    def add(kind: str, odds: float) -> None:
-        found[kind] = found.get(kind, 0.0) + odds
-
-    if unit:
-        kind = "field" if unit in {"G", "mG"} and OTHER.search(words) else kind_of(unit)  # gauss
-        add(kind if kind in {"acceleration", "rate"} else "", _POLICY.unit)
-    for text, odds in ((words, _POLICY.word), (table, _POLICY.table)):
-        if text and RATE.search(text) and not re.search(r"uncal|temp|\bstd|\bcov", text):
-            add("rate", odds)
-        elif text and OTHER.search(text):
-            add("", _POLICY.unit)
-        elif text and ACCELERATION.search(text):
-            add("acceleration", odds)
-        else:
-            continue
-        break
-    if not found and WEAK_ACCELERATION.search(words):
-        add("acceleration", _POLICY.letter)
-    if not found and WEAK_RATE.search(words):
-        add("rate", _POLICY.letter)
-    is_named = any(mark.search(words) for mark in (RATE, OTHER, ACCELERATION))
-    return found, bool(PROCESSED.search(words if is_named else f"{words} {table}"))
 
 
 def _evidence_of_numbers(table: RawTable, columns: tuple[str, str, str]) -> tuple[dict[str, float], TriadUnit | None]:
