@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from functools import lru_cache
 
 from gfimu.base.errors import UnitError
 from gfimu.base.units import STANDARD_GRAVITY
@@ -66,11 +67,13 @@ _SAME = {
 }
 _AMBIGUOUS = {"g", "s", "h", "d", "c", "min", "gs", "day", "hz", "rev", "turn", "turns", "second", "gal"}
 _WORD = re.compile(r"[^_ ,.]+")
+_REMEMBERED = 10_000  # numerical: units and names; lines of a log repeat theirs
 _JOINTS = "_ ,."
 _MOST_WORDS = 4  # numerical: deg_per_second, m_per_s_squared
 _BRACKETS = re.compile(r"[\[({]((?:[^\[\](){}]|\([^\[\](){}]*\))+)[\])}]$")
 
 
+@lru_cache(_REMEMBERED)
 def _plain(text: str) -> str:
     """Return a unit as its sign: ``deg_per_s`` and ``°/s`` as ``deg/s``, ``m_per_second_squared`` as ``m/s2``."""
     short = "".join(text.lower().translate(_SIGNS).split())
@@ -112,6 +115,7 @@ def kind_of(unit: str) -> str:
     return next((kind for kind, factors in _KINDS.items() if plain in factors), "")
 
 
+@lru_cache(_REMEMBERED)
 def bracketed_unit(name: str) -> tuple[str, str]:
     """Split the name of a column into the name and a unit in brackets at its end; empty without one."""
     plain = name.strip()

@@ -105,18 +105,18 @@ def _of_one_stem(table: RawTable, names: Sequence[str]) -> list[Triad]:
     stems: dict[tuple[str, ...], list[str]] = {}
     for name in names:
         words = words_of(name).split()
-        for place in range(len(words)):
+        for place in (place for place, word in enumerate(words) if word.isalpha()):
             stem = (unit_of_name(name)[1], *words[:place], "", *words[place + 1 :])
             stems.setdefault(stem, []).append(name)
     found = []
-    for three in stems.values():
-        if len(three) == 3 and any(all(map(is_kind, three)) for is_kind in (is_acceleration, is_rate)):
-            angles = [next((angle for angle in _ANGLES if angle in words_of(name)), "") for name in three]
-            first, second, third = sorted(
-                three, key=lambda name: _ANGLES.index(angles[three.index(name)] or _ANGLES[0])
-            )
-            why = "" if all(angles) else "; which of them is x, y and z is a guess"
-            found.append(replace(_triad(table, (first, second, third)), why_not=why))
+    for three in (one for one in stems.values() if len(one) == 3):
+        angles = [next((angle for angle in _ANGLES if angle in words_of(name)), "") for name in three]
+        if all(map(is_rate, three)) and sorted(angles) == sorted(_ANGLES):
+            first, second, third = (three[angles.index(angle)] for angle in _ANGLES)
+            found.append(_triad(table, (first, second, third)))
+        elif all(map(is_acceleration, three)):
+            why = "; which of them is x, y and z is a guess"
+            found.append(replace(_triad(table, (three[0], three[1], three[2])), why_not=why))
     return found
 
 

@@ -6,7 +6,7 @@ import csv
 import itertools
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from gfimu.recording.units import kind_of, unit_of_name
@@ -198,16 +198,19 @@ def _header(before: Sequence[str], separator: str, width: int, row_name: str) ->
     They are in the last line, or above a line of units. Names that repeat have their group in a line above them.
     """
     is_row_named = row_name[:1] == '"' or not _is_datum(row_name)
-    filled = (line for line in reversed(before) if line.strip())
-    found = (_named_cells(line, separator, width, is_row_named=is_row_named) for line in filled)
-    rows = list(itertools.islice(itertools.takewhile(lambda cells: cells is not None, found), _POLICY.most_header))
+    rows: list[list[str]] = []
+    for line in filter(str.strip, reversed(before)):
+        cells = _named_cells(line, separator, width, is_row_named=is_row_named)
+        if cells is None or len(rows) == _POLICY.most_header:
+            break
+        rows.append(cells)
     if not rows:
         return None
     units = next((place for place, cells in enumerate(rows) if _are_units(cells)), len(rows))
     place = units + 1 if units + 1 < len(rows) else 0
     names, *above = rows[place:]
     if above and above[0][0] and len({*names}) < len(names) - above[0].count("") // 2:
-        groups = itertools.accumulate(above[0], lambda group, cell: cell or group)
+        groups: Iterator[str] = itertools.accumulate(above[0], lambda group, cell: str(cell or group))
         names = [f"{group} {name}" for group, name in zip(groups, names, strict=True)]
     return _names(names, rows[units] if units < len(rows) and units != place else [])
 

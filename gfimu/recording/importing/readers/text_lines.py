@@ -37,6 +37,7 @@ _HOST, _VALUE = "host_time", "value"
 _LONGEST_STAMP = 60  # numerical: characters before and with the time of a line
 _LABVIEW, _END = "LabVIEW Measurement", "***End_of_Header***"
 _LONGEST = 10_000  # characters of a line of a serial monitor
+_LONGEST_LOG = 1000  # numerical: characters of a line of a log
 _LEAST = 0.5  # of the filled lines
 _LEAST_OFTEN = 0.5  # of the lines of the most frequent kind
 
@@ -138,7 +139,7 @@ def _cells(line: str) -> dict[str, str]:
     A label with ``:``, ``=`` or a bracket after it has one number or a list. Where no label of the line has such a mark
     two labels, or a unit after the numbers, show that words are labels.
     """
-    if len(line) > _LONGEST:
+    if len(line) > _LONGEST_LOG:
         return {}
     stamp, line = _stamp(line)
     found = list(_MARKED.finditer(line))
