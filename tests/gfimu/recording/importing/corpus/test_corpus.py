@@ -12,9 +12,7 @@ from corpus_motion import SEEN, SHAPES
 
 LEAST_RIGHT, MOST_SILENT = 0.90, 0.02  # shares of the shapes
 RANK = ("silent", "marked", "right")
-LESS = {
-    "motionsense": "marked",  # the gravity that a filter estimates is a chip where there is no other
-}
+LESS: dict[str, str] = {}
 """Shapes that are not read right: at least so."""
 
 
