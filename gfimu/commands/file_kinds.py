@@ -66,7 +66,7 @@ def check_file(data: Mapping[str, Any], source: str) -> str:
     import msgspec
 
     from gfimu.base.files.schema import Table, read
-    from gfimu.recording.importing.map_keys import complete
+    from gfimu.recording.importing.column_map import complete
 
     kind = next((kind for kind, key in _MARKS.items() if key in data), None)
     if kind is None:

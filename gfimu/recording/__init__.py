@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from gfimu.recording.importing.clock import increasing_times
     from gfimu.recording.importing.column_map import ColumnSpec, TextSpec
     from gfimu.recording.importing.dates import nanoseconds_of
-    from gfimu.recording.importing.notation import factor_of
     from gfimu.recording.importing.piece import nearest_rows
     from gfimu.recording.importing.readers import read_foreign
     from gfimu.recording.importing.readers.registry import format_of
@@ -42,5 +41,6 @@ if TYPE_CHECKING:
     from gfimu.recording.tables.column_file import write_columns
     from gfimu.recording.timing.conversion_times import conversion_times
     from gfimu.recording.timing.reference_times import reference_on_rows, reference_series
+    from gfimu.recording.units import factor_of
 else:
     __getattr__, __dir__, __all__ = declared_names(__name__)

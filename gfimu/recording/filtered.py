@@ -29,10 +29,10 @@ from gfimu.recording.importing.recognise import map_hint
 from gfimu.recording.mimu4444 import is_mimu4444, read_mimu4444
 from gfimu.recording.recording import Recording
 from gfimu.recording.tables.arrow import ArrowStream
-from gfimu.recording.tables.column_file import ColumnFile, open_columns
+from gfimu.recording.tables.column_file import open_columns
 from gfimu.recording.tables.table_columns import TableColumns
 
-__all__ = ["filtered_recording", "rows_between", "without_rows"]
+__all__ = ["filtered_recording", "recording_of", "rows_between"]
 
 _SAID = {
     "corrupt": "with a value that can be no measurement",
@@ -75,17 +75,46 @@ def filtered_recording(
     if "t_s" not in table.names:
         hint = map_hint(source) if isinstance(source, str | Path) else ""
         raise InputError(f"{table.file}: column t_s is missing; every recording needs it" + (f"; {hint}" * bool(hint)))
-    whole, dropped = _ordered(table, column_map)
+    found = table.read_as_found(table.names)
+    times = [block[0] for block in table.blocks(["t_s"])]
+    t = (np.concatenate(times) if times else np.empty(0))[column_map.skip_rows :]
+    if not len(t):
+        raise InputError(f"{table.file}: no samples below the first {column_map.skip_rows}; skip fewer rows")
+    kept, metadata = np.ones(len(t), dtype=bool), table.metadata
+    if {"duplicates", "unordered"} & set(column_map.drop):
+        increasing = increasing_times(t, 0.0, f"{table.file}: column t_s", drop=column_map.drop)
+        kept, metadata = increasing.rows, _counted(table.metadata, increasing.dropped)
+        for note in increasing.notes:
+            warn(note)
+    columns = {name: values[column_map.skip_rows :][kept] for name, values in found.items()}
     if unit is None:
         unit = "lsb" if any(name.endswith("_lsb") for name in table.names) else "m_s2"
-    recording = Recording.read(whole, array=array, unit=unit)  # type: ignore[arg-type]
-    recording = replace(recording, metadata=_counted(recording.metadata, dropped))
-    columns = (_column_of(name, table.names) for name in recording.channels)
-    absent = np.column_stack([np.isnan(next(iter(whole.blocks([name])))[0]) for name in columns])
-    return _chosen_rows(recording, column_map, absent, str(table.file), array)
+    return recording_of(columns, metadata, column_map, str(table.file), array=array, unit=unit)
 
 
-def without_rows(
+def recording_of(
+    columns: Mapping[str, NDArray[Any]],
+    metadata: Mapping[str, Any],
+    column_map: ColumnMap,
+    source: str,
+    *,
+    array: AccelerometerArray | None,
+    unit: str = "m_s2",
+) -> Recording:
+    """Return columns that are named as in a recording as one, without the rows that a map leaves out.
+
+    They pass the reader of the project's own tables, so that the same checks hold.
+    """
+    arrow = {name: pa.array(values, from_pandas=True) for name, values in columns.items()}
+    table = TableColumns(pa.table(arrow).replace_schema_metadata(schema_metadata(metadata)))
+    table.file = source
+    recording = Recording.read(table, array=array, unit=unit)  # type: ignore[arg-type]
+    names = (next(name for name in columns if name.startswith(f"{channel}_")) for channel in recording.channels)
+    absent = np.column_stack([np.isnan(next(iter(table.blocks([name])))[0]) for name in names])
+    return _chosen_rows(recording, column_map, absent, source, array)
+
+
+def _without_rows(
     recording: Recording,
     drop: Collection[str],
     *,
@@ -177,27 +206,7 @@ def _chosen_rows(
     rows = np.flatnonzero(rows_between(recording.t_s, column_map.time, source))
     first, stop = int(rows[0]), int(rows[-1]) + 1
     taken = recording.slice(first, stop)
-    return without_rows(taken, column_map.drop, absent=absent[first:stop], source=source, array=array)
-
-
-def _ordered(table: ColumnFile, column_map: ColumnMap) -> tuple[TableColumns, Mapping[str, int]]:
-    """Return the table without its first rows and those whose times do not increase, as far as the map asks for it."""
-    found = table.read_as_found(table.names)
-    times = [block[0] for block in table.blocks(["t_s"])]
-    t = np.concatenate(times) if times else np.empty(0)
-    if column_map.skip_rows >= len(t):
-        raise InputError(f"{table.file}: no samples below the first {column_map.skip_rows}; skip fewer rows")
-    rows, dropped = slice(column_map.skip_rows, None), {}
-    kept = np.ones(len(t[rows]), dtype=bool)
-    if {"duplicates", "unordered"} & set(column_map.drop):
-        sorted_out = increasing_times(t[rows], 0.0, f"{table.file}: column t_s", drop=column_map.drop)
-        kept, dropped = sorted_out.rows, dict(sorted_out.dropped)
-        for note in sorted_out.notes:
-            warn(note)
-    columns = {name: pa.array(values[rows][kept], from_pandas=True) for name, values in found.items()}
-    whole = TableColumns(pa.table(columns).replace_schema_metadata(schema_metadata(table.metadata)))
-    whole.file = str(table.file)
-    return whole, dropped
+    return _without_rows(taken, column_map.drop, absent=absent[first:stop], source=source, array=array)
 
 
 def _misread(recording: Recording) -> NDArray[np.bool_]:
@@ -219,10 +228,6 @@ def _out_of_range(recording: Recording, array: AccelerometerArray | None, source
     if np.isinf(most).all():
         raise InputError(f"{source}: to drop out_of_range, add full_range_m_s2 to the array's part file")
     return np.asarray((np.abs(recording.readings) > most).any(axis=1))
-
-
-def _column_of(channel: str, names: Collection[str]) -> str:
-    return next(name for name in names if name.startswith(f"{channel}_"))
 
 
 def _counted(metadata: Mapping[str, Any], counts: Mapping[str, int]) -> dict[str, Any]:

@@ -9,23 +9,20 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 from numpy.typing import ArrayLike, NDArray
 
 from gfimu.array.array import AccelerometerArray
 from gfimu.base.errors import InputError, warn
 from gfimu.base.files.input_file import as_path
 from gfimu.base.files.memory import MemorySize, with_memory
-from gfimu.base.files.metadata import schema_metadata
 from gfimu.recording.carried_array import array_metadata
-from gfimu.recording.filtered import filtered_recording, rows_between, without_rows
+from gfimu.recording.filtered import filtered_recording, recording_of, rows_between
 from gfimu.recording.importing.column_map import UNMAPPED, ColumnMap, load_map
 from gfimu.recording.importing.piece import Piece, combined_file, merged_piece, piece_of
 from gfimu.recording.importing.readers import read_foreign
 from gfimu.recording.importing.readers.tables import table_file
 from gfimu.recording.recording import Recording
 from gfimu.recording.tables.arrow import ArrowStream
-from gfimu.recording.tables.table_columns import TableColumns
 
 _FEWEST = 50  # samples of two loggers, whose clocks are compared
 _SURE = 5.0  # standard deviations from which two clocks differ
@@ -128,7 +125,7 @@ def mapped_recording(
     geometry = array or (AccelerometerArray.load(chosen.array) if chosen.array and len(pieces) == 1 else None)
     for piece in pieces[1:]:
         _refuse_another_clock(pieces[0], piece)
-    merged = _between(merged_piece(pieces), chosen)
+    merged = merged_piece(pieces)
     for note in merged.times.notes:
         warn(note)
     return _recording(merged, chosen, geometry, [file.source for file in files])
@@ -183,29 +180,22 @@ def mapped_reference(
     InputError
         As `mapped_recording`; also if the map names no reference and no channel that the file has.
     """
-    piece = _between(piece_of(read_foreign(path, column_map.format, column_map.text), column_map), column_map)
+    piece = piece_of(read_foreign(path, column_map.format, column_map.text), column_map)
     if not piece.reference and not piece.channels:
         raise InputError(
             f"{path}: map {column_map.name!r} gives no reference; add one under [reference], as tacho_rad_s"
         )
     for note in piece.times.notes:
         warn(note)
-    return piece.times.t_s, dict(piece.reference), piece.times.origin_s, dict(piece.channels)
-
-
-def _between(piece: Piece, chosen: ColumnMap) -> Piece:
-    """Return the samples from the map's ``start_s`` to its ``stop_s`` after the first one."""
-    rows = rows_between(piece.times.t_s, chosen.time, piece.source)
-    if rows.all():
-        return piece
-    groups = (
-        {name: values[rows] for name, values in one.items()} for one in (piece.channels, piece.reference, piece.other)
+    rows = rows_between(piece.times.t_s, column_map.time, piece.source)
+    reference, channels = (
+        {name: values[rows] for name, values in one.items()} for one in (piece.reference, piece.channels)
     )
-    return Piece(piece.source, replace(piece.times, t_s=piece.times.t_s[rows]), *groups)
+    return piece.times.t_s[rows], reference, piece.times.origin_s, channels
 
 
 def _recording(piece: Piece, chosen: ColumnMap, array: AccelerometerArray | None, sources: list[str]) -> Recording:
-    """Return a recording through the reader of the project's own tables, so that the same checks hold."""
+    """Return the recording of a piece, with the channel names of an array."""
     names = list(piece.channels)
     if array is not None and set(names) != set(array.channels):
         if len(names) != array.n_channels:
@@ -226,8 +216,5 @@ def _recording(piece: Piece, chosen: ColumnMap, array: AccelerometerArray | None
         metadata |= array_metadata(array)
     if piece.times.dropped:
         metadata["dropped_rows"] = dict(piece.times.dropped)
-    table = TableColumns(pa.table(dict(columns)).replace_schema_metadata(schema_metadata(metadata)))
-    table.file = piece.source
-    recording = replace(Recording.read(table, array=array), unit_from="column_map")  # type: ignore[arg-type]
-    absent = np.column_stack([np.isnan(values) for values in piece.channels.values()])
-    return without_rows(recording, chosen.drop, absent=absent, source=piece.source, array=array)
+    recording = recording_of(columns, metadata, chosen, piece.source, array=array)
+    return replace(recording, unit_from="column_map")

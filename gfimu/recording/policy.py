@@ -35,6 +35,14 @@ class GuessPolicy:
         Distance from gravity by which a unit that hardly any logger writes has to be nearer [ratio]. A bias of 14 mg.
     pose_lengths : float
         Scatter of the lengths of poses, with the gains and biases of raw readings [ratio].
+    exact_counts : float
+        Distance of gravity from a usual number of counts, beyond which an offset or another scale is as likely [ratio].
+        The gain and bias of most chips.
+    unit_vector : float
+        Distance of the length at rest from one, and its scatter, below which it is that of a direction [ratio]. Errors
+        of gain are a hundred times that, and a chip has noise.
+    ratio_error : float
+        Error of the ratio of a gyro's numbers to the turn of gravity [nats]. Seen up to 0.067.
     """
 
     unit: float = 8.0
@@ -48,6 +56,9 @@ class GuessPolicy:
     near_in_motion: float = 0.3
     rare: float = 0.014
     pose_lengths: float = 0.2
+    exact_counts: float = 0.03
+    unit_vector: float = 1e-4
+    ratio_error: float = 0.07
 
 
 @dataclass(frozen=True)

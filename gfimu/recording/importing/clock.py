@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from gfimu.base.errors import InputError
 from gfimu.recording.importing.column_map import TimeSpec
 from gfimu.recording.importing.dates import nanoseconds_of
-from gfimu.recording.importing.notation import factor_of
 from gfimu.recording.importing.raw_table import RawTable
+from gfimu.recording.units import factor_of
 
 __all__ = ["Times", "increasing_times", "parts_of", "times_of"]
 
@@ -48,6 +48,11 @@ class Times:
     origin_s: float
     notes: tuple[str, ...]
     dropped: Mapping[str, int] = field(default_factory=dict)
+
+    @property
+    def rate_hz(self) -> float:
+        """Sample rate, Hz: one by the median step; NaN of fewer than two samples."""
+        return 1.0 / float(np.median(np.diff(self.t_s))) if len(self.t_s) > 1 else float("nan")
 
 
 def times_of(table: RawTable, spec: TimeSpec, source: str, *, drop: Collection[str] = ()) -> Times:

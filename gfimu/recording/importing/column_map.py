@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
@@ -12,9 +12,9 @@ import msgspec
 
 from gfimu.base.errors import InputError, did_you_mean
 from gfimu.base.files.input_file import is_ordinary
-from gfimu.base.files.model_files import find_model, list_models, read_toml
-from gfimu.recording.importing.map_keys import FOR_ALL, complete, set_map_key
-from gfimu.recording.importing.notation import factor_of
+from gfimu.base.files.model_files import find_model, list_models, read_toml, set_key
+from gfimu.recording.quantities import REFERENCE_UNITS
+from gfimu.recording.units import factor_of, kind_of
 
 __all__ = [
     "REFERENCE_KINDS",
@@ -23,6 +23,7 @@ __all__ = [
     "ColumnSpec",
     "TextSpec",
     "TimeSpec",
+    "complete",
     "list_maps",
     "load_map",
     "map_toml",
@@ -34,19 +35,7 @@ DropKind = Literal["corrupt", "out_of_range", "missing", "wrong_read", "duplicat
 """Rows that a map can leave out; see `gfimu.recording.filtered`."""
 
 REFERENCE_KINDS = {
-    "tacho_rad_s": "rate",
-    "command_rad_s": "rate",
-    "angle_rad": "angle",
-    "position_x_m": "length",
-    "position_y_m": "length",
-    "position_z_m": "length",
-    "carriage_m": "length",
-    "carriage_speed_m_s": "speed",
-    "carriage_acceleration_m_s2": "acceleration",
-    "temperature_degC": "temperature",
-    "gyro_x_rad_s": "rate",
-    "gyro_y_rad_s": "rate",
-    "gyro_z_rad_s": "rate",
+    f"{quantity}_{unit}": kind_of(unit) for quantity, (unit, *_) in REFERENCE_UNITS.items() if quantity != "t"
 }
 """References of a recording, and the kind of their unit."""
 
@@ -59,6 +48,9 @@ _Column = Annotated[
 
 UNMAPPED = "raw_"
 """How the names of columns that a map does not name begin in a recording."""
+
+
+_FOR_ALL = ("unit", "scale")  # keys of a map that hold for each of its channels that has none of its own
 
 
 class ColumnSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -265,7 +257,9 @@ def load_map(name: str | Path | ColumnMap | None, changes: Sequence[str] = ()) -
     name : str, Path, ColumnMap or None
         The map; None begins with an empty one.
     changes : sequence of str
-        Keys to set, such as ``"time.unit=ms"`` (see `gfimu.recording.importing.map_keys`).
+        Keys to set, such as ``"time.unit=ms"``. A channel may be given by its column alone, where the map has a
+        ``unit`` (and ``scale``) for all: ``unit=g``, ``channels.a11=ax``. Kinds of rows to drop may be one text:
+        ``drop=corrupt,duplicates``.
 
     Raises
     ------
@@ -286,7 +280,7 @@ def load_map(name: str | Path | ColumnMap | None, changes: Sequence[str] = ()) -
         path = find_model("maps", name)
         source, beside, data = str(path), path.parent, {"name": path.stem, **read_toml(path)}
     for change in changes:
-        set_map_key(data, change)
+        set_key(data, change, option="--map-set", example="time.unit=ms", as_table=_as_column)
     if changes and not isinstance(name, ColumnMap):
         source = "--map-set" if name is None else f"{source} with --map-set"
     try:
@@ -299,6 +293,35 @@ def load_map(name: str | Path | ColumnMap | None, changes: Sequence[str] = ()) -
     return found
 
 
+def _as_column(value: Any, names: list[str]) -> Any:
+    """Return the short form of a column, its name or number alone, as the table that gets a further key."""
+    short = isinstance(value, str | int) and len(names) == 2 and names[0] in {"channels", "reference"}
+    return {"column": value} if short else value
+
+
+def complete(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the keys of a map with its short forms written out: columns alone, a unit for all channels, one text."""
+    whole = {key: value for key, value in data.items() if key not in _FOR_ALL}
+    usual = {key: data[key] for key in _FOR_ALL if key in data}
+    channels = whole.get("channels")
+    if isinstance(channels, Mapping):
+        whole["channels"] = {name: _column(spec, usual) for name, spec in channels.items()}
+    elif usual and channels is None:
+        raise InputError(f'{" and ".join(usual)} of the column map: no channels; add channels.a11 = "ax"')
+    reference = whole.get("reference")
+    if isinstance(reference, Mapping):
+        whole["reference"] = {name: _column(spec, {}) for name, spec in reference.items()}
+    if isinstance(whole.get("drop"), str):
+        whole["drop"] = [kind.strip() for kind in whole["drop"].split(",") if kind.strip()]
+    return whole
+
+
+def _column(spec: Any, usual: Mapping[str, Any]) -> Any:
+    if isinstance(spec, Mapping):
+        return {**usual, **spec}
+    return {"column": spec, **usual} if isinstance(spec, str | int | list) else spec
+
+
 def _plain_words(text: str) -> str:
     """Return a message of the schema with the place in the file instead of a JSON path, and the keys valid there."""
     reason, _, place = text.partition(" - at ")
@@ -306,7 +329,7 @@ def _plain_words(text: str) -> str:
     words = reason.replace("`object`", "a table of keys").replace("Object", "the table" if where else "the map")
     if "unknown field" in words:
         table = {"time": TimeSpec, "text": TextSpec, "": ColumnMap}.get(where, ColumnSpec)
-        keys = (*table.__struct_fields__, *(FOR_ALL if table is ColumnMap else ()))
+        keys = (*table.__struct_fields__, *(_FOR_ALL if table is ColumnMap else ()))
         near = did_you_mean(_quoted(words), keys)
         words = words.replace("contains unknown field", "has no key") + f"; valid: {', '.join(keys)}{near}"
     elif "Invalid enum value" in words and where.startswith("drop"):

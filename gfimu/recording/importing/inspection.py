@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -164,7 +164,7 @@ def inspect_file(path: str | Path | ArrowStream, *, table: str = "") -> Inspecti
     plain = raw.table(table) if table else next(iter(raw.tables.values()))
     own = own_chips(list(plain.columns))
     if own:
-        return _own_recording(raw, plain, own)
+        return _own_recording(RawFile(raw.source, raw.format, {plain.name: plain}), plain, own)
     found = suggest(raw, table=table, name=Path(raw.source).name.partition(".")[0] or "map")
     fitting = tuple(fitting_maps(raw))
     suggested, reasons = found.column_map, found.reasons
@@ -178,20 +178,30 @@ def inspect_file(path: str | Path | ArrowStream, *, table: str = "") -> Inspecti
     notes += [note.removeprefix(f"{raw.source}: ") for note in found.table.notes]
     columns = {name: one.numbers(name) for one, triad in found.chips for name in triad.columns}
     doubts += sample_doubts(columns, [triad.columns for _, triad in found.chips])
-    return Inspection(
-        source=raw.source,
-        format=raw.format,
-        table=found.table.name,
-        tables=tuple(f"{name or 'the file'} ({len(one)} rows)" for name, one in found.raw.tables.items()),
-        rows=len(found.table),
-        sample_rate_hz=_rate(times) if is_rate_known else math.nan,
+    seen = _seen(found.raw, found.table, times if is_rate_known else None, roles, reasons)
+    return replace(
+        seen,
         chips=len(found.chips),
-        columns=tuple(_view(found.table, name, roles.get(name, "")) for name in found.table.columns),
         fitting=fitting,
         notes=tuple(notes),
         doubts=tuple(doubts),
-        reasons=reasons,
         column_map=suggested,
+    )
+
+
+def _seen(
+    raw: RawFile, table: RawTable, times: Times | None, roles: Mapping[str, str], reasons: Sequence[str]
+) -> Inspection:
+    """Return what a look at the columns of a table shows."""
+    return Inspection(
+        source=raw.source,
+        format=raw.format,
+        table=table.name,
+        tables=tuple(f"{name or 'the file'} ({len(one)} rows)" for name, one in raw.tables.items()),
+        rows=len(table),
+        sample_rate_hz=math.nan if times is None else times.rate_hz,
+        columns=tuple(_view(table, name, roles.get(name, "")) for name in table.columns),
+        reasons=tuple(reasons),
     )
 
 
@@ -209,30 +219,15 @@ def _own_recording(raw: RawFile, table: RawTable, chips: dict[str, list[str]]) -
     if times is not None and times.dropped:
         notes.append("with such rows it is refused; gfimu convert --drop duplicates,unordered leaves them out")
     doubts += sample_doubts({name: table.numbers(name) for name in channels}, list(chips.values()))
-    return Inspection(
-        source=raw.source,
-        format=raw.format,
-        table=table.name,
-        tables=(f"{table.name or 'the file'} ({len(table)} rows)",),
-        rows=len(table),
-        sample_rate_hz=_rate(times),
-        chips=len(chips),
-        columns=tuple(_view(table, name, roles.get(name, "")) for name in table.columns),
-        notes=tuple(notes),
-        doubts=tuple(doubts),
-        reasons=("its columns carry their units: a recording of gfimu's, which needs no column map",),
-        is_own=True,
-    )
+    why = "its columns carry their units: a recording of gfimu's, which needs no column map"
+    seen = _seen(raw, table, times, roles, [why])
+    return replace(seen, chips=len(chips), notes=tuple(notes), doubts=tuple(doubts), is_own=True)
 
 
 def _is_reference(name: str) -> bool:
     return name in TIME_COLUMNS.values() or any(
         name == f"{quantity}_{unit}" for quantity, units in REFERENCE_UNITS.items() for unit in units
     )
-
-
-def _rate(times: Times | None) -> float:
-    return 1.0 / float(np.median(np.diff(times.t_s))) if times is not None and len(times.t_s) > 1 else float("nan")
 
 
 def _view(table: RawTable, name: str, role: str) -> ColumnView:

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from gfimu.base.errors import InputError, did_you_mean
 from gfimu.recording.importing.clock import Times, times_of
 from gfimu.recording.importing.column_map import REFERENCE_KINDS, ColumnMap, ColumnSpec, TimeSpec
-from gfimu.recording.importing.notation import factor_of
 from gfimu.recording.importing.raw_table import RawFile, RawTable
 from gfimu.recording.importing.recognise import fitting_maps
 from gfimu.recording.importing.splitting import split_file
 from gfimu.recording.quantities import TIME_COLUMNS
+from gfimu.recording.units import factor_of
 
 __all__ = ["Piece", "at_times", "chip_names", "combined_file", "merged_piece", "nearest_rows", "piece_of"]
 

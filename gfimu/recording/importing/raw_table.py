@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.base.errors import InputError
-from gfimu.recording.importing.notation import bracketed_unit
+from gfimu.recording.units import bracketed_unit
 
 __all__ = ["RawFile", "RawTable"]
 

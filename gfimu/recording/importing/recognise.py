@@ -15,10 +15,10 @@ from gfimu.recording.importing.clock import times_of
 from gfimu.recording.importing.column_map import ColumnMap, list_maps, load_map
 from gfimu.recording.importing.guessing.times import RATES
 from gfimu.recording.importing.guessing.units import NEAR, rest_windows
-from gfimu.recording.importing.notation import bracketed_unit, factor_of, kind_of
 from gfimu.recording.importing.raw_table import RawFile, RawTable
 from gfimu.recording.importing.readers import read_foreign
 from gfimu.recording.quantities import READING_UNITS
+from gfimu.recording.units import bracketed_unit, factor_of, kind_of
 
 __all__ = ["fitting_maps", "map_hint", "own_chips"]
 
@@ -123,10 +123,9 @@ def _plausibility(raw: RawFile, column_map: ColumnMap) -> int | None:
         if column_map.text.columns and not gravity:
             return None  # without names gravity alone speaks for a map
         try:
-            t = times_of(table, column_map.time, raw.source).t_s
+            rate = times_of(table, column_map.time, raw.source).rate_hz
         except InputError:
             return 2 * gravity
-        rate = 1.0 / float(np.median(np.diff(t))) if len(t) > 1 else 0.0
         return 2 * gravity + (RATES[0] <= rate <= RATES[1])
     return 0
 

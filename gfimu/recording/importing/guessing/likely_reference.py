@@ -10,10 +10,10 @@ from typing import Any
 from numpy.typing import NDArray
 
 from gfimu.recording.importing.column_map import REFERENCE_KINDS, UNMAPPED
+from gfimu.recording.importing.guessing.names import is_rate
 from gfimu.recording.importing.guessing.parts import known_reference, varies
-from gfimu.recording.importing.guessing.triads import is_rate
-from gfimu.recording.importing.notation import factor_of, kind_of, unit_of_name
 from gfimu.recording.quantities import GYRO_COLUMNS, REFERENCE_UNITS, TIME_COLUMNS, reference_quantity
+from gfimu.recording.units import factor_of, kind_of, unit_of_name
 
 __all__ = ["LikelyReference", "likely_references", "reference_remedy"]
 

@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gfimu.recording.importing.column_map import REFERENCE_KINDS, ColumnSpec
-from gfimu.recording.importing.guessing.names import words_of
+from gfimu.recording.importing.guessing.names import is_acceleration, words_of
 from gfimu.recording.importing.guessing.times import find_time
-from gfimu.recording.importing.guessing.triads import Triad, find_triads, is_acceleration
+from gfimu.recording.importing.guessing.triads import Triad, find_triads
 from gfimu.recording.importing.guessing.units import TriadUnit, triad_values, unit_of_rate
-from gfimu.recording.importing.notation import factor_of, kind_of, unit_of_name
 from gfimu.recording.importing.raw_table import RawFile, RawTable
+from gfimu.recording.units import factor_of, kind_of, unit_of_name
 
 __all__ = [
     "GYRO",

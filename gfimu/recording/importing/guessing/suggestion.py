@@ -27,9 +27,9 @@ from gfimu.recording.importing.guessing.parts import (
 from gfimu.recording.importing.guessing.times import RATES, TimeGuess, find_time
 from gfimu.recording.importing.guessing.triads import Triad, find_triads
 from gfimu.recording.importing.guessing.units import are_poses, triad_values, unit_of_acceleration
-from gfimu.recording.importing.notation import factor_of
 from gfimu.recording.importing.raw_table import RawFile, RawTable
 from gfimu.recording.importing.splitting import find_split, split_file
+from gfimu.recording.units import factor_of
 
 __all__ = ["Suggestion", "roles_by_map", "suggest", "with_shipped"]
 
@@ -132,6 +132,7 @@ def suggest(raw: RawFile, *, table: str = "", name: str = "map") -> Suggestion:
     force = next((force_of(*chip, unit) for chip, unit in zip(chips, units, strict=True) if chip[0] is chosen), None)
     gyro = gyro_part(raw, chosen, [one for one in triads if one.kind == "rate"], force, _sample_rate(chosen, time))
     taken = {*roles, *(name for part in (*parts, gyro) for name in part.roles)}
+    taken |= {name for one in triads if one.kind for name in one.columns}
     others = other_references(chosen, taken)
     parts += [gyro, others]
     reference = {**gyro.columns, **others.columns}
@@ -271,7 +272,7 @@ def _sample_rate(table: RawTable, time: TimeGuess) -> float | None:
     if not time.is_rate_known:
         return None
     try:
-        t = times_of(table, time.spec, "").t_s
+        rate = times_of(table, time.spec, "").rate_hz
     except InputError:
         return None
-    return 1.0 / float(np.median(np.diff(t))) if len(t) > 1 else None
+    return rate if np.isfinite(rate) else None

@@ -15,8 +15,8 @@ from gfimu.recording.doubts.stamps import steady_clock
 from gfimu.recording.importing.clock import parts_of
 from gfimu.recording.importing.column_map import TimeSpec
 from gfimu.recording.importing.dates import nanoseconds_of
-from gfimu.recording.importing.notation import TIME, factor_of, kind_of, unit_of_name
 from gfimu.recording.importing.raw_table import RawTable
+from gfimu.recording.units import factor_of, kind_of, unit_of_name
 
 __all__ = ["RATES", "TimeGuess", "find_time", "stated_rate"]
 
@@ -181,7 +181,7 @@ def _of_numbers(table: RawTable, name: str, values: NDArray[Any]) -> tuple[float
     scatter = _scatter(steps, usual)
     units = [unit] if has_unit else _units_to_try(plain, float(known[0]), usual)
     for candidate in units:
-        factor = factor_of(candidate, "time") if has_unit else TIME[candidate]
+        factor = factor_of(candidate, "time")
         steady = None if wrap is not None or part is not None else steady_clock(known.astype(float) * factor)
         rate = 1.0 / (usual * factor) if steady is None else steady.rate_hz
         if not has_unit and not RATES[0] <= rate <= RATES[1]:
@@ -265,7 +265,7 @@ def _within_seconds(name: str, values: NDArray[Any], steps: NDArray[np.float64])
         return None
     usual = float(np.median(steps[steps > 0]))
     for unit, wrap in (("ms", 1e3), ("us", 1e6), ("ns", 1e9)):
-        rate = 1.0 / (usual * TIME[unit])
+        rate = 1.0 / (usual * factor_of(unit, "time"))
         fits = 0.9 * wrap <= float(values.max()) < wrap and bool(np.all(wrap + back <= 3.0 * usual))
         if fits and RATES[0] <= rate <= RATES[1]:
             why = f"{name} counts {unit} within each second, {rate:.4g} Hz; gaps of a second or more don't show"

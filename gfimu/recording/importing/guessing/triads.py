@@ -14,16 +14,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from gfimu.recording.importing.guessing.names import (
-    ABSOLUTE,
-    ACCELERATION,
-    OTHER,
-    PROCESSED,
-    RATE,
-    WEAK_ACCELERATION,
-    WEAK_RATE,
-    words_of,
-)
+from gfimu.recording.importing.guessing.names import OTHER, evidence_of_names, is_acceleration, is_rate, words_of
 from gfimu.recording.importing.guessing.units import (
     TriadUnit,
     rest_windows,
@@ -31,14 +22,15 @@ from gfimu.recording.importing.guessing.units import (
     triad_values,
     unit_of_acceleration,
 )
-from gfimu.recording.importing.notation import kind_of, unit_of_name
 from gfimu.recording.importing.raw_table import RawTable
 from gfimu.recording.policy import GuessPolicy
+from gfimu.recording.units import kind_of, unit_of_name
 
-__all__ = ["Triad", "find_triads", "is_acceleration", "is_rate"]
+__all__ = ["Triad", "find_triads"]
 
 _NUMBERED = re.compile(r"(?P<before>.*?)(?P<number>\d+)(?P<after>\D*)")
 _ARTICLES = {"": "another quantity", "acceleration": "an acceleration", "rate": "a rate"}
+_ANGLES = ("roll", "pitch", "yaw")  # about x, y and z
 _AXES = (("x", "y", "z"), ("0", "1", "2"), ("1", "2", "3"))
 _ROUND = 0.1  # relative: by which the length at rest scatters where it is the same in all poses
 _NEAR_ZERO = 0.02  # of the largest reading
@@ -66,6 +58,10 @@ class Triad:
         Whether the names are those of an acceleration that a program has computed from others.
     why_not : str
         For a reason, where the numbers contradict the names; empty if they don't.
+    unit : (str, float)
+        Unit and scale by which the length at rest is gravity.
+    off : float
+        Relative distance of that length from gravity.
     """
 
     columns: tuple[str, str, str]
@@ -75,6 +71,8 @@ class Triad:
     is_usual: bool = False
     is_processed: bool = False
     why_not: str = ""
+    unit: tuple[str, float] = ("", 1.0)
+    off: float = 0.0
 
 
 def find_triads(table: RawTable, taken: Sequence[str] = ()) -> list[Triad]:
@@ -98,7 +96,28 @@ def find_triads(table: RawTable, taken: Sequence[str] = ()) -> list[Triad]:
                     continue
                 used |= set(three)
                 found.append(triad)
-    return _chosen(found, named=True)
+    others = [name for short, name in free.items() if short not in used]
+    return _chosen([*found, *_of_one_stem(table, others)], named=True)
+
+
+def _of_one_stem(table: RawTable, names: Sequence[str]) -> list[Triad]:
+    """Return neighbours that are forces, or rates, by name and differ in one word, as roll, pitch and yaw."""
+    stems: dict[tuple[str, ...], list[str]] = {}
+    for name in names:
+        words = words_of(name).split()
+        for place in (place for place, word in enumerate(words) if word.isalpha()):
+            stem = (unit_of_name(name)[1], *words[:place], "", *words[place + 1 :])
+            stems.setdefault(stem, []).append(name)
+    found = []
+    for three in (one for one in stems.values() if len(one) == 3):
+        angles = [next((angle for angle in _ANGLES if angle in words_of(name)), "") for name in three]
+        if all(map(is_rate, three)) and sorted(angles) == sorted(_ANGLES):
+            first, second, third = (three[angles.index(angle)] for angle in _ANGLES)
+            found.append(_triad(table, (first, second, third)))
+        elif all(map(is_acceleration, three)):
+            why = "; which of them is x, y and z is a guess"
+            found.append(replace(_triad(table, (three[0], three[1], three[2])), why_not=why))
+    return found
 
 
 def _threes_of(short: str) -> list[tuple[str, str, str]]:
@@ -209,35 +228,20 @@ def _chosen(triads: list[Triad], *, named: bool) -> list[Triad]:
         return [replace(one, kind="") if one.is_processed or (named and not one.by_name) else one for one in triads]
     raw = any(not one.is_processed for one in showing)
     usual = any(one.is_usual for one in showing)
+    best = min(showing, key=lambda one: one.off)
     found = []
     for one in triads:
         if one.is_processed and one.kind == "acceleration" and (raw or not one.shows_gravity):
             found.append(replace(one, kind=""))
         elif one in showing and usual and not one.is_usual and not one.by_name:
             found.append(replace(one, kind=""))  # of constant length without being gravity: a magnetic field
+        elif one in showing and not named and one.unit != best.unit and one.off > _POLICY.exact_counts:
+            found.append(replace(one, kind=""))  # beside a chip that shows gravity in another unit
         elif one.kind == "acceleration" and not one.shows_gravity and not one.by_name:
             found.append(replace(one, kind="rate"))
         else:
             found.append(one)
     return found
-
-
-def is_acceleration(name: str) -> bool:
-    """Whether a column is an acceleration along one axis by its unit or its name."""
-    words, unit = words_of(name), unit_of_name(name)[1]
-    if OTHER.search(words) or RATE.search(words) or PROCESSED.search(words) or ABSOLUTE.search(words):
-        return False
-    if unit:
-        return kind_of(unit) == "acceleration"
-    return bool(ACCELERATION.search(words) or WEAK_ACCELERATION.match(words))
-
-
-def is_rate(name: str) -> bool:
-    """Whether a column is an angular rate by its unit or its name."""
-    words, unit = words_of(name), unit_of_name(name)[1]
-    if OTHER.search(words) and not RATE.search(words):
-        return False
-    return kind_of(unit) == "rate" if unit else bool(RATE.search(words) or WEAK_RATE.match(words))
 
 
 def _short(name: str) -> str:
@@ -247,7 +251,7 @@ def _short(name: str) -> str:
 def _triad(table: RawTable, columns: tuple[str, str, str]) -> Triad:
     """Return three columns with what they measure by all evidence: unit, words, the table's name, and the numbers."""
     words = words_of(columns[0]) if table.named else ""
-    named, is_processed = _evidence_of_names(words, words_of(table.name), unit_of_name(columns[0])[1])
+    named, is_processed = evidence_of_names(words, words_of(table.name), unit_of_name(columns[0])[1])
     numbers, unit = _evidence_of_numbers(table, columns)
     kinds = ("", "acceleration", "rate")  # of equal ones the first
     kind = max(kinds, key=lambda one: named.get(one, 0.0) + numbers.get(one, 0.0))
@@ -258,35 +262,8 @@ def _triad(table: RawTable, columns: tuple[str, str, str]) -> Triad:
     is_sure = named.get(kind, 0.0) >= _POLICY.letter
     gravity = unit is not None and unit.is_gravity and kind == "acceleration"
     is_usual = gravity and unit is not None and not any(unit.offset)
-    return Triad(columns, kind, is_sure, gravity, is_usual, is_processed, why_not)
-
-
-def _evidence_of_names(words: str, table: str, unit: str) -> tuple[dict[str, float], bool]:
-    """Return log odds of what a column measures by its name and that of its table, and whether it was computed."""
-    found: dict[str, float] = {}
-
-    def add(kind: str, odds: float) -> None:
-        found[kind] = found.get(kind, 0.0) + odds
-
-    if unit:
-        kind = kind_of(unit)
-        add(kind if kind in {"acceleration", "rate"} else "", _POLICY.unit)
-    for text, odds in ((words, _POLICY.word), (table, _POLICY.table)):
-        if text and RATE.search(text) and not re.search(r"uncal|temp|\bstd|\bcov", text):
-            add("rate", odds)
-        elif text and OTHER.search(text):
-            add("", _POLICY.unit)
-        elif text and ACCELERATION.search(text):
-            add("acceleration", odds)
-        else:
-            continue
-        break
-    if not found and WEAK_ACCELERATION.search(words):
-        add("acceleration", _POLICY.letter)
-    if not found and WEAK_RATE.search(words):
-        add("rate", _POLICY.letter)
-    is_named = any(mark.search(words) for mark in (RATE, OTHER, ACCELERATION))
-    return found, bool(PROCESSED.search(words if is_named else f"{words} {table}"))
+    found = Triad(columns, kind, is_sure, gravity, is_usual, is_processed, why_not)
+    return found if unit is None else replace(found, unit=(unit.unit, unit.scale), off=unit.off)
 
 
 def _evidence_of_numbers(table: RawTable, columns: tuple[str, str, str]) -> tuple[dict[str, float], TriadUnit | None]:
@@ -302,6 +279,8 @@ def _evidence_of_numbers(table: RawTable, columns: tuple[str, str, str]) -> tupl
     is_sphere = sphere_of(windows) is not None
     if not is_constant and not is_sphere:
         return {"rate": _POLICY.zero}, None
+    if max(abs(usual - 1.0), float(np.std(lengths))) < _POLICY.unit_vector:
+        return {}, None  # a direction or a part of a quaternion, which a program has computed
     guess = unit_of_acceleration(table, columns)
     is_gravity = guess.is_gravity
     if not (is_gravity and not any(guess.offset)) and float(np.nanmax(np.nanstd(values, axis=0))) < _STEADY * usual:

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from gfimu.base.units import STANDARD_GRAVITY
 from gfimu.recording.doubts.samples import least_step
-from gfimu.recording.importing.notation import factor_of, kind_of, last_word_unit, unit_of_name
 from gfimu.recording.importing.raw_table import RawTable
 from gfimu.recording.policy import GuessPolicy
+from gfimu.recording.units import factor_of, kind_of, last_word_unit, unit_of_name
 
 __all__ = [
     "NEAR",
@@ -42,6 +42,7 @@ _SCALES = {
     ("rad/s", 1.0): "rad/s",
     ("deg/s", 1.0): "°/s",
     ("deg/s", 1e-3): "m°/s",
+    ("mrad/s", 1.0): "mrad/s",
     **{("deg/s", 1.0 / counts): f"{counts:g} counts per °/s" for counts in (131.0, 65.5, 32.8, 16.4, 14.375)},
     **{("deg/s", 1e-3 * step): f"{step:g} m°/s per count" for step in (4.375, 8.75, 17.5, 35.0, 70.0)},
 }
@@ -70,6 +71,8 @@ class TriadUnit:
         Whether gravity at rest is that of a usual unit, a usual number of counts, or of a sphere of poses.
     agreement : float
         Of rates: correlation of what gravity turns by with what they would turn it by; 0 where that is not known.
+    off : float
+        Of accelerations in a usual unit: relative distance of the length at rest from gravity.
     """
 
     unit: str
@@ -79,6 +82,7 @@ class TriadUnit:
     sure: bool
     is_gravity: bool = True
     agreement: float = 0.0
+    off: float = 0.0
 
 
 def triad_values(table: RawTable, columns: Sequence[str]) -> NDArray[np.float64]:
@@ -141,12 +145,12 @@ def unit_of_acceleration(table: RawTable, columns: Sequence[str]) -> TriadUnit:
             offset = (float(centre[0]), float(centre[1]), float(centre[2]))
             where = ", ".join(f"{one:.6g}" for one in centre)
             why = f"rest poses lie on a sphere about {where} of radius {radius:.6g} counts"
-            return TriadUnit("g", 1.0 / radius, offset, why, True)
+            return TriadUnit("g", 1.0 / radius, offset, why, _are_whole(values))
     if _LOW_COUNTS < length < math.inf:
         power = 2.0 ** round(math.log2(length))
         if abs(length / power - 1.0) < NEAR and _are_whole(values):
             why = f"at rest its length is {length:.5g}: {power:g} counts per g"
-            return TriadUnit("g", 1.0 / power, zero, why, True)
+            return TriadUnit("g", 1.0 / power, zero, why, abs(length / power - 1.0) < _POLICY.exact_counts)
         why = f"at rest its length is {length:.5g}, taken as 1 g; the data sheet has the exact scale"
         return TriadUnit("g", 1.0 / length, zero, why, False, False)
     return TriadUnit(
@@ -172,7 +176,7 @@ def _usual_unit(values: NDArray[np.float64], length: float) -> TriadUnit | None:
         else f"at rest {length:.4g}: {best}"
     )
     why += f"; {' or '.join(others)} is possible" if others else ""
-    return TriadUnit(unit, scale, (0.0, 0.0, 0.0), why, not others)
+    return TriadUnit(unit, scale, (0.0, 0.0, 0.0), why, not others, off=off[best])
 
 
 def _are_whole(values: NDArray[np.float64]) -> bool:
@@ -230,7 +234,7 @@ def unit_of_rate(
         others = [
             word
             for key, word in _SCALES.items()
-            if word != words and abs(_log_ratio(key, turn) - _log_ratio((unit, scale), turn)) < 0.03
+            if word != words and abs(_log_ratio(key, turn) - _log_ratio((unit, scale), turn)) < _POLICY.ratio_error
         ]
         why = f"gravity turns as these rates do in {words} (ratio {ratio:.3f})"
         why += f"; {' or '.join(others)} is as likely" if others else ""

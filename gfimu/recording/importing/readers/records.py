@@ -1,11 +1,9 @@
-"""Files of records: JSON, one record per line or all in one, and the sheets of an Excel workbook."""
+"""Files of records: JSON, one record per line or all in one."""
 
 from __future__ import annotations
 
-import datetime as dt
 import itertools
 import sys
-import zipfile
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
@@ -18,14 +16,13 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from gfimu.base.errors import InputError
-from gfimu.base.files.memory import MemoryLimit, MemoryLimitError
-from gfimu.base.optional_packages import require
+from gfimu.base.files.memory import MemoryLimit
 from gfimu.recording.importing.column_map import TextSpec
 from gfimu.recording.importing.raw_table import RawFile, RawTable
-from gfimu.recording.importing.readers.text import GROWS, cell_values, table_of_text
-from gfimu.recording.reading import parsing, read_bytes
+from gfimu.recording.importing.readers.text import cell_values
+from gfimu.recording.reading import read_bytes
 
-__all__ = ["read_excel", "read_json"]
+__all__ = ["read_json", "tables_of_json"]
 
 _LEAST_ROWS = 3
 _MOST_LINES, _LONGEST_WORDS = 100, 200  # numerical: of what is stated beside the readings, characters of each
@@ -33,33 +30,32 @@ _LEAST_SHARE, _SAME_KIND = 0.1, 0.7  # of the rows of the most frequent kind of 
 _MOST_CELLS = 64  # of a list in a record: what has more is no sample
 _GROWS: Mapping[bytes, int] = {b"{": 280, b"[": 100, b",": 48, b":": 62}
 """Numerical: memory for an object, a list, a value and a key of JSON while they become columns, bytes, measured."""
-_TIMES_SHEET = 5.0  # numerical: memory for a byte of a workbook's XML, unpacked, measured
-_ROW = 60  # numerical: bytes of an empty row, of which a file of two rows may state millions
 
 
 def read_json(path: Path, text: TextSpec = TextSpec()) -> RawFile:
     """Read JSON: records one per line, a list of records, or lists of numbers by name."""
-    data = read_bytes(path).removeprefix(b"\xef\xbb\xbf").strip()
-    MemoryLimit.of(path).needs(len(data) + sum(size * data.count(mark) for mark, size in _GROWS.items()))
+    return RawFile(str(path), "json", tables_of_json(read_bytes(path), str(path), MemoryLimit.of(path)))
+
+
+def tables_of_json(data: bytes, source: str, limit: MemoryLimit) -> dict[str, RawTable]:
+    """Return the tables that the bytes of JSON hold, by name, if they fit into a limit of memory."""
+    data = data.removeprefix(b"\xef\xbb\xbf").strip()
+    limit.needs(len(data) + sum(size * data.count(mark) for mark, size in _GROWS.items()))
     lost = 0
     try:
         content = msgspec.json.decode(data)
     except RecursionError:
-        raise InputError(f"{path}: JSON nested too deeply; write a record per sample") from None
+        raise InputError(f"{source}: JSON nested too deeply; write a record per sample") from None
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
         content, lost = _lines(data)
         if len(content) < _LEAST_ROWS:
-            raise InputError(f"{path}: damaged JSON file ({str(error)[:120]}); write it again") from None
+            raise InputError(f"{source}: damaged JSON file ({str(error)[:120]}); write it again") from None
     tables = {name: table for name, table in _tables(content, "") if len(table) >= _LEAST_ROWS}
     if not tables:
-        raise InputError(f"{path}: JSON without a list of readings; write a record per sample, or a list per column")
+        raise InputError(f"{source}: JSON without a list of readings; write a record per sample, or a list per column")
     stated = tuple(itertools.islice(_stated(content, ""), _MOST_LINES))
-    note = (f"{path}: left out {lost} lines that are no JSON",) if lost else ()
-    return RawFile(
-        str(path),
-        "json",
-        {name: replace(one, notes=(*note, *one.notes), preamble=stated) for name, one in tables.items()},
-    )
+    note = (f"{source}: left out {lost} lines that are no JSON",) if lost else ()
+    return {name: replace(one, notes=(*note, *one.notes), preamble=stated) for name, one in tables.items()}
 
 
 def _stated(content: Any, name: str) -> Iterator[str]:
@@ -130,7 +126,8 @@ def _of_records(records: list[Any], name: str) -> Iterator[tuple[str, RawTable]]
     if len(kinds) < 2 or len(shared) >= _SAME_KIND * max(map(len, kinds)):
         kinds = []  # keys are left out here and there
     for group in [[row for row in rows if row.keys() == keys] for keys in kinds] or [rows]:
-        own = next((key for key in group[0] if kinds and key not in shared), "").partition(".")[0]
+        own = next((key for key in group[0] if kinds and key not in shared), "")
+        own = own.partition("[")[0] if "[" in own else own.rpartition(".")[0] or own
         label = f"{name} {own}".strip()
         keys = dict.fromkeys(key for row in group for key in row)
         yield label, _table(label, {key: [row.get(key) for row in group] for key in keys})
@@ -170,42 +167,3 @@ def _table(name: str, columns: Mapping[str, list[Any]]) -> RawTable:
             if unreadable:
                 notes.append(f"column {key}: {unreadable} cells are no numbers and count as missing")
     return RawTable(name, found, tuple(notes))
-
-
-def read_excel(path: Path, text: TextSpec = TextSpec()) -> RawFile:
-    """Read the sheets of an Excel workbook (xlsx), each as a table."""
-    require(f"{path}: an Excel workbook", "openpyxl", instead="save the sheet as CSV")
-    import openpyxl
-
-    limit = MemoryLimit.of(path)
-    tables: dict[str, RawTable] = {}
-    with parsing(path, "workbook", "save the sheet as CSV"):
-        with zipfile.ZipFile(path) as archive:
-            limit.needs(_TIMES_SHEET * sum(one.file_size for one in archive.infolist()))
-        tabs = msgspec.structs.replace(text, separator="tab", decimal=".")
-        book = openpyxl.load_workbook(path, read_only=True, data_only=True, keep_links=False)
-        for sheet in book.worksheets:
-            sheet.reset_dimensions()  # a file may state a million columns; rows are as long as they are
-            lines, size = [], 0
-            for row in sheet.iter_rows(values_only=True):
-                lines.append("\t".join(_cell(one) for one in row))
-                size += len(lines[-1]) + _ROW
-                limit.needs(GROWS * size, at_least=True)
-            try:
-                table = table_of_text("\n".join(lines).encode(), f"{path}/{sheet.title}", tabs, limit)
-            except MemoryLimitError:
-                raise
-            except InputError:
-                continue  # a sheet of remarks or a chart
-            tables[sheet.title] = RawTable(sheet.title, table.columns, table.notes, table.named, table.preamble)
-    if not tables:
-        raise InputError(f"{path}: no sheet with numbers in columns; save the recording as CSV")
-    return RawFile(str(path), "excel", tables)
-
-
-def _cell(value: Any) -> str:
-    if value is None:
-        return ""
-    if isinstance(value, dt.datetime):
-        return value.isoformat(sep=" ")
-    return str(value).replace("\t", " ").replace("\n", " ")

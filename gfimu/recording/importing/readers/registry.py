@@ -17,8 +17,14 @@ from gfimu.recording.importing.readers.hdf5 import read_hdf5
 from gfimu.recording.importing.readers.logs import read_bag, read_mcap, read_ulog
 from gfimu.recording.importing.readers.matlab import read_matlab
 from gfimu.recording.importing.readers.matrices import read_numpy
-from gfimu.recording.importing.readers.records import read_excel, read_json
-from gfimu.recording.importing.readers.tables import archive_format, read_archive, read_arrow, read_parquet
+from gfimu.recording.importing.readers.records import read_json
+from gfimu.recording.importing.readers.tables import (
+    archive_format,
+    read_archive,
+    read_arrow,
+    read_excel,
+    read_parquet,
+)
 from gfimu.recording.importing.readers.text import is_text, read_text
 from gfimu.recording.reading import first_unpacked
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import csv
+import itertools
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from gfimu.recording.importing.notation import kind_of, unit_of_name
+from gfimu.recording.units import kind_of, unit_of_name
 
 __all__ = ["COMMENT_MARKS", "Layout", "cells_of", "layout_of", "trailer", "upright"]
 
@@ -35,6 +36,7 @@ class LayoutPolicy:
     least_numbers: float = 0.5  # of the filled cells of a line of data
     least_flat: int = 20  # numbers of a line with a name before them, from which each line is a column
     flat: int = 5  # times the lines: numbers of lines without names, from which each line is a column
+    most_header: int = 4  # lines of names, units and groups
     most_last: int = 20  # lines after the numbers
 
 
@@ -191,19 +193,26 @@ def _unread(lines: Sequence[Sequence[str]], decimal: str) -> float:
 
 
 def _header(before: Sequence[str], separator: str, width: int, row_name: str) -> tuple[str, ...] | None:
-    """Return the names in the last line before the numbers, if it has one for each cell; with a line of units below."""
-    units: list[str] = []
-    for line in reversed(before):
-        if not line.strip():
-            continue
-        cells = _named_cells(line, separator, width, is_row_named=row_name[:1] == '"' or not _is_datum(row_name))
-        if cells is None:
+    """Return the names in the lines before the numbers, if there are some for each cell.
+
+    They are in the last line, or above a line of units. Names that repeat have their group in a line above them.
+    """
+    is_row_named = row_name[:1] == '"' or not _is_datum(row_name)
+    rows: list[list[str]] = []
+    for line in filter(str.strip, reversed(before)):
+        cells = _named_cells(line, separator, width, is_row_named=is_row_named)
+        if cells is None or len(rows) == _POLICY.most_header:
             break
-        if not units and _are_units(cells):
-            units = cells
-            continue
-        return _names(cells, units)
-    return _names(units, []) if units else None
+        rows.append(cells)
+    if not rows:
+        return None
+    units = next((place for place, cells in enumerate(rows) if _are_units(cells)), len(rows))
+    place = units + 1 if units + 1 < len(rows) else 0
+    names, *above = rows[place:]
+    if above and above[0][0] and len({*names}) < len(names) - above[0].count("") // 2:
+        groups: Iterator[str] = itertools.accumulate(above[0], lambda group, cell: str(cell or group))
+        names = [f"{group} {name}" for group, name in zip(groups, names, strict=True)]
+    return _names(names, rows[units] if units < len(rows) and units != place else [])
 
 
 def _named_cells(line: str, separator: str, width: int, *, is_row_named: bool) -> list[str] | None:
@@ -222,7 +231,8 @@ def _are_units(cells: Sequence[str]) -> bool:
     """Whether cells hold units: ``ms``, ``[mg]``, ``deg/s``; all that are filled, and not numbers of axes."""
     plain = [cell.strip(" []()*").lower() for cell in cells]
     known = [bool(kind_of(cell)) for cell in plain]
-    return sum(known) >= 2 and all(one or cell in _NO_UNITS for one, cell in zip(known, plain, strict=True))
+    others = [cell for one, cell in zip(known, plain, strict=True) if not one and cell not in _NO_UNITS]
+    return sum(known) >= 2 and len(others) < sum(known) and all("/" in cell for cell in others)  # km/h
 
 
 def _names(cells: Sequence[str], units: Sequence[str]) -> tuple[str, ...]:
@@ -235,4 +245,7 @@ def _names(cells: Sequence[str], units: Sequence[str]) -> tuple[str, ...]:
             for name, unit in zip(names, below, strict=True)
         ]
     repeated = Counter(names)
-    return tuple(f"{name}_{place}" if repeated[name] > 1 else name for place, name in enumerate(names, start=1))
+    return tuple(
+        re.sub(r"( *[\[(][^\[(]*)?$", rf"_{place}\1", name, count=1) if repeated[name] > 1 else name
+        for place, name in enumerate(names, start=1)
+    )

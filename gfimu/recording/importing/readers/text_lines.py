@@ -7,6 +7,8 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 
+from gfimu.recording.units import bracketed_unit, kind_of
+
 __all__ = ["plain_lines"]
 
 _LOOKED_AT = 400  # lines
@@ -15,25 +17,28 @@ _HOST_TIME = re.compile(
     rf"^\s*\[?({_DATE}\d{{1,2}}:\d\d:\d\d[.,:]\d+)\]?(?:\s*(?:->|>|\]|\|)\s*| +(?=[+-]?[\d.]+ *[,;\t]))"
 )
 _REAL = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
-_LABELLED = re.compile(rf"((?<![A-Za-z_])[A-Za-z_][\w .\[\]()/°²^-]{{0,60}}?)\s*[:=]\s*({_REAL})(?![\d:])")
+_LABEL = r"(?<![A-Za-z_])[A-Za-z_][\w .@#\[\]()/°²^-]{0,60}?"
+_REALS = rf"({_REAL}(?:\s{{0,9}}[,;\s]\s{{0,9}}{_REAL}(?![\d:.]))*)(?![\d:])"
+_MARKED = re.compile(
+    rf"({_LABEL}|(?<!\w))\s{{0,9}}(?:(?:[:=]|->|\s[->|](?=\s))\s{{0,9}}[\[(]?|(?<=\W)[\[(])\s{{0,9}}{_REALS}"
+)
+_SPACED = re.compile(rf"({_LABEL})\s{{1,9}}{_REALS}")
 _BRACKETED = re.compile(r"^\s*[\[({][^A-Za-z\"]*[\])}]\s*,?\s*$")
+_VECTORS = re.compile(r"\d\t[^,\t]+,[^,\t]+,")
 _CHECKED = re.compile(r"\*[0-9A-Fa-f]{2}\s*$")
-_STAMP = re.compile(rf"{_DATE}\d{{1,2}}:\d\d:\d\d(?:[.,:]\d+)?")
+_STAMP = re.compile(rf"({_DATE}\d{{1,2}}:\d\d:\d\d(?:[.,:]\d+)?)(?:,\d{{3}})*")
 _PLOTTED = re.compile(r"^>([A-Za-z_][\w.]*):(\d+(?:\.\d+)?):([+-]?[\d.]+(?:[eE][+-]?\d+)?)")
 _REMARK = re.compile(r"(?<=\d)\s*(?://|#)[^\"]*$")
 _COLOURS = re.compile(r"\x1b\[[\d;]*m")
-_TICK = re.compile(r"^\s*[IWEDV] \((\d+)\)")
-_UNIT = re.compile(r"\s*([A-Za-zµ°²%/^\d]{0,8})\s*$")
-_PREFIXED = re.compile(
-    r"^(?=.{0,1000}$)(.{0,200}(?:(?<!\w)([A-Za-z]\w*)|[\])])\s*(?::|->|-|>|\|)\s*)"
-    rf"({_REAL}(?:[\s,;]+{_REAL})+)[\s,;]*$"
-)
+_TICK = re.compile(r"^\s*[IWEDV] \((\d+(?:\.\d+)?)\)|(\d+) ?[mun]?s(?=\W)")
+_UNIT = re.compile(r"[A-Za-zµ°²%/^\d]{0,8}")
 _SECONDS = re.compile(r"\[\s*(\d+\.\d+)\]")
-_HOST = "host_time"
+_HOST, _VALUE = "host_time", "value"
+_LONGEST_STAMP = 60  # numerical: characters before and with the time of a line
 _LABVIEW, _END = "LabVIEW Measurement", "***End_of_Header***"
 _LONGEST = 10_000  # characters of a line of a serial monitor
+_LONGEST_LOG = 1000  # numerical: characters of a line of a log
 _LEAST = 0.5  # of the filled lines
-_MOST_LABELS = 8  # words before the numbers of a log: sensors
 _LEAST_OFTEN = 0.5  # of the lines of the most frequent kind
 
 
@@ -43,7 +48,7 @@ def plain_lines(lines: Sequence[str]) -> list[str]:
     Named cells become a table with a header. Other lines stay as they are.
     """
     lines = _of_labview(lines) if lines and lines[0].startswith(_LABVIEW) else list(lines)
-    return _without_labels(_without_prefixes(_with_host_time(_without_frames(lines))))
+    return _without_labels(_with_host_time(_without_frames(lines)))
 
 
 def _most(lines: Sequence[str], mark: re.Pattern[str]) -> bool:
@@ -58,14 +63,11 @@ def _without_frames(lines: list[str]) -> list[str]:
     if _most(lines, _REMARK):
         lines = [_REMARK.sub("", line) for line in lines]
     if _most(lines, _PLOTTED):
-        first = next(found[1] for line in lines if (found := _PLOTTED.match(line)))
-        return [
-            f"time:{one[2]},{one[1]}:{one[3]}" if one[1] == first else f"{one[1]}:{one[3]}"
-            for one in map(_PLOTTED.match, lines)
-            if one
-        ]
+        return [_PLOTTED.sub(r"I (\2) \1:\3", line) for line in lines if _PLOTTED.match(line)]
     if _most(lines, _BRACKETED):
         return [re.sub(r"[\[\](){}]", "", line) if _BRACKETED.search(line) else line for line in lines]
+    if _most(lines, _VECTORS):
+        return [line.replace("\t", ",") for line in lines]
     if _most(lines, _CHECKED):
         return [_CHECKED.sub("", line) for line in lines]
     return lines
@@ -79,30 +81,12 @@ def _with_host_time(lines: list[str]) -> list[str]:
     for line in lines:
         found = _HOST_TIME.match(line)
         rest = line[found.end() :] if found else line
-        if found is None or _LABELLED.match(rest.strip()):
+        if found is None or _MARKED.match(rest.strip()):
             plain.append(line)
             continue
         separator = next((mark for mark in "\t;," if mark in rest), " ")
         is_header = bool(re.match(r"[A-Za-z]", rest.split(separator)[0].strip()))
         plain.append(f"{_HOST if is_header else found[1]}{separator}{rest}")
-    return plain
-
-
-def _without_prefixes(lines: list[str]) -> list[str]:
-    """Return lines as ``[INFO] [12.345]: 0.1, 0.2`` without what a log puts before, with its time as the first cell.
-
-    Lines that begin with different words, as ``acc: 0.1 0.2 9.8``, have three named cells each.
-    """
-    if not _most(lines, _PREFIXED):
-        return lines
-    found = {k: one for k, line in enumerate(lines) if len(line) <= _LONGEST and (one := _PREFIXED.match(line))}
-    several = 1 < len({one[2] for one in found.values()}) <= _MOST_LABELS
-    plain = list(lines)
-    for place, one in found.items():
-        stamp, cells = _stamp(one[1]), re.split(r"[\s,;]+", one[3])
-        if several and len(cells) == 3:
-            cells = [f"{one[2]} {axis}: {cell}" for axis, cell in zip("XYZ", cells, strict=True)]
-        plain[place] = ";".join([stamp, *cells] if stamp else cells)
     return plain
 
 
@@ -124,63 +108,81 @@ def _of_labview(lines: Sequence[str]) -> list[str]:
 
 
 def _without_labels(lines: list[str]) -> list[str]:
-    """Return lines as ``t:88 ax:0.1`` as a header and lines of numbers; several kinds of lines in turn make one row."""
+    """Return log lines as ``t:88 ax:0.1`` as a header and lines of numbers; several kinds in turn make one row."""
     looked = [line for line in lines[:_LOOKED_AT] if line.strip()]
-    kinds = Counter(labels for line in looked if (labels := _labels(line)))
-    if not kinds or sum(kinds.values()) <= _LEAST * len(looked):
+    kinds = Counter(tuple(cells) for line in looked if (cells := _cells(line)))
+    often = max(kinds.values(), default=0)
+    order = [names for names, count in kinds.items() if count >= _LEAST_OFTEN * often]
+    if sum(kinds[names] for names in order) <= _LEAST * len(looked):
         return lines
-    often = max(kinds.values())
-    order = [labels for labels in kinds if kinds[labels] >= _LEAST_OFTEN * often]
-    order = [labels[labels[0] == _HOST and place > 0 :] for place, labels in enumerate(order)]
-    if sum(len(labels) for labels in order) < 3:
-        return lines
-    names = [name for labels in order for name in labels]
-    if len(set(names)) < len(names):
+    order = [names[names[0] == _HOST and place > 0 :] for place, names in enumerate(order)]
+    header = [name for names in order for name in names]
+    if len(header) < 3 or len(set(header)) < len(header):
         return lines
     rows: list[dict[str, str]] = []
     for line in lines:
-        labels = _labels(line)
-        labels = labels if labels in order else labels[1:]
-        if labels not in order:
-            continue
-        if labels == order[0] or not rows:
-            rows.append({})
-        stamp = _stamp(line)
-        numbers = [number for _, number in _LABELLED.findall(line)]
-        cells = [stamp, *numbers] if labels[0] == _HOST and stamp else numbers
-        rows[-1] |= dict(zip(labels, cells, strict=True))
-    before = [f"# {line}" for line in itertools.takewhile(lambda line: _labels(line) not in order, lines)]
-    return [*before, ";".join(names), *(";".join(row.get(name, "") for name in names) for row in rows)]
+        cells = _cells(line)
+        if tuple(cells) not in order:
+            cells.pop(_HOST, None)
+        if tuple(cells) in order:
+            if tuple(cells) == order[0] or not rows:
+                rows.append({})
+            rows[-1] |= cells
+    before = [f"# {line}" for line in itertools.takewhile(lambda line: tuple(_cells(line)) not in order, lines)]
+    named = [";".join(header)] if any(not name.startswith((_HOST, _VALUE)) for name in header) else []
+    return [*before, *named, *(";".join(row.get(name, "") for name in header) for row in rows)]
 
 
-def _stamp(text: str) -> str:
-    """Return the time in front of a line: a date or time of day, or ms since the start as an ESP32 prints them."""
-    found = _STAMP.search(text)
-    tick = _TICK.match(text) or _SECONDS.search(text)
-    return found[0] if found else tick[1] if tick else ""
+def _cells(line: str) -> dict[str, str]:
+    """Return the numbers of a log line by name, as ``acc X [g]``; none where not all of the line is so.
 
-
-def _labels(line: str) -> tuple[str, ...]:
-    """Return the names of the numbers of a line, with the unit at its end; empty where not all of it is so."""
-    found = list(_LABELLED.finditer(line)) if len(line) <= _LONGEST else []
-    if not found:
-        return ()
-    before = line[: found[0].start()]
-    stamp = _stamp(before)
-    between = _LABELLED.sub("", line[found[0].start() : found[-1].end()])
-    unit = _UNIT.fullmatch(line[found[-1].end() :].strip(" ,;|\t}"))
-    if re.search(r"\w", between) or unit is None:
-        return ()
-    if not stamp and re.search(r"\w", before):
-        return ()
-    names: list[str] = []
+    A label with ``:``, ``=`` or a bracket after it has one number or a list. Where no label of the line has such a mark
+    two labels, or a unit after the numbers, show that words are labels.
+    """
+    if len(line) > _LONGEST_LOG:
+        return {}
+    stamp, line = _stamp(line)
+    found = list(_MARKED.finditer(line))
+    is_marked = bool(found)
+    found = found or list(_SPACED.finditer(line))
+    if not found or (not stamp and re.search(r"\d", line[: found[0].start()])):
+        return {}
+    labels: list[str] = []
+    units: list[str] = []
+    for one, end in zip(found, [*(after.start() for after in found[1:]), len(line)], strict=True):
+        label, unit = bracketed_unit(one[1].rpartition("] ")[2] if "[" not in one[1] else one[1])
+        first, _, others = label.partition(" ")
+        if labels and others and not units[-1] and kind_of(first):
+            label, units[-1] = others, first
+        after = line[one.end() : end].strip(" ,;|\t)]}>")
+        if not _UNIT.fullmatch(after):
+            return {}
+        labels.append(label.strip(" .-[]()"))
+        units.append(unit or after)
+    if not is_marked and len(found) < 2 and not kind_of(units[-1]):
+        return {}
+    if len(found) <= 3 and not any(units[:-1]):
+        units = units[-1:] * len(found)
+    cells = {_HOST: stamp} if stamp else {}
     stem = ""
-    for one in found:
-        name = one[1].strip()
-        if name.lower() in {"x", "y", "z"} and stem and name.lower() != "x":
-            name = f"{stem} {name}"
+    for label, unit, one in zip(labels, units, found, strict=True):
+        numbers = re.split(r"[\s,;]+", one[2])
+        name = f"{stem} {label}" if stem and label.lower() in {"y", "z"} else label or _VALUE
         stem = name[:-1].strip() if name[-1:].lower() == "x" and len(name) > 1 else stem
-        names.append(name)
-    if unit[1] and len(found) <= 3:
-        names = [f"{name} [{unit[1]}]" for name in names]
-    return (_HOST, *names) if stamp else tuple(names)
+        axes = {1: ("",), 3: (" X", " Y", " Z")}.get(
+            len(numbers), tuple(f" {place}" for place in range(1, 1 + len(numbers)))
+        )
+        cells |= {
+            f"{name}{axis} [{unit}]" if unit else f"{name}{axis}": number
+            for axis, number in zip(axes, numbers, strict=True)
+        }
+    return cells
+
+
+def _stamp(line: str) -> tuple[str, str]:
+    """Split off the time in front of a line: a date or time of day, or ms since the start as an ESP32 prints them."""
+    for mark in (_STAMP, _TICK, _SECONDS):
+        found = mark.search(line[:_LONGEST_STAMP])
+        if found and not _MARKED.search(line[: found.start()]):
+            return next(filter(None, found.groups())), line[found.end() :]
+    return "", line
