@@ -163,6 +163,10 @@ SEEN = frozenset(
         "umafall",
         "harth",
         "x_imu",
+        "up_fall",
+        "kaist_urban",
+        "opensim_sto",
+        "eobs_bursts",
     }
 )
 """Shapes whose head was compared with public files, or with programs that write or read them; others follow the
