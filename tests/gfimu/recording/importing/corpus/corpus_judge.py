@@ -126,7 +126,8 @@ def _named(found):
 
 
 def _same(read: np.ndarray, truth: np.ndarray, tolerance: float) -> bool:
-    if len(read) != len(truth):
-        truth = truth[: len(read)]
+    if len(read) > len(truth):
+        return False
+    truth = truth[: len(read)]
     off = np.abs(read - truth)
     return bool(np.isfinite(off).mean() > 0.97 and np.nanquantile(off, 0.97) < tolerance)
