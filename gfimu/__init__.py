@@ -119,7 +119,6 @@ if TYPE_CHECKING:
     from gfimu.commands.show import show as show
     from gfimu.commands.simulate import simulate as simulate
     from gfimu.commands.start import start as start
-    from gfimu.commands.started import Started as Started
     from gfimu.commands.tolerance import tolerance as tolerance
     from gfimu.commands.view import view as view
     from gfimu.diagnosis.design.proposal import Proposal as Proposal

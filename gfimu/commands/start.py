@@ -15,7 +15,7 @@ gfimu start toolhead.csv moves.csv --rig axis --part adxl345 --rate-hz 3200
 import math
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -375,15 +375,11 @@ def _place(value: str | Sequence[float]) -> Any:
 
 
 def _named(recording: "Recording", drawing: "AccelerometerArray") -> "Recording":
-    from dataclasses import replace
-
     return replace(recording, channels=drawing.channels)
 
 
 def _twin(recording: "Recording", kind: str, source: str, drawing: "AccelerometerArray") -> "Twin":
     """Return the twin of a rig whose array is beside its file."""
-    from dataclasses import replace
-
     from sim.twin import Twin
 
     content: dict[str, Any] = {"sample_rate_hz": float(f"{recording.sample_rate:.6g}"), "drive": {"source": source}}

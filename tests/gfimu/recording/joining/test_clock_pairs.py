@@ -28,7 +28,7 @@ def test_the_stated_standard_deviations_cover_the_truth():
 
 @pytest.mark.study
 def test_study_of_200_pairs():
-    """The table of docs/how_to/import.md: offsets are stated a fifth too surely, and one in sixty is far off."""
+    """The table of docs/how_to/import.md: of offsets 93 % are within their 95 % interval, 1 % far off."""
     missed = []
     for seed in range(200, 400):
         pair = draw_pair(np.random.default_rng(seed))
@@ -38,8 +38,8 @@ def test_study_of_200_pairs():
             continue
     size = np.abs(missed)
     assert len(size) > 180
-    assert (np.mean(size < 1.96, axis=0) > [0.87, 0.91]).all()
-    assert (np.mean(size > 5.0, axis=0) < [0.03, 0.02]).all()
+    assert (np.mean(size < 1.96, axis=0) > 0.90).all()
+    assert (np.mean(size > 5.0, axis=0) < 0.02).all()
 
 
 @pytest.mark.parametrize("kind", ["hand", "loggers", "swing"])
