@@ -65,6 +65,7 @@ _COLUMNS = {
     "carriage": "carriage_m",
     "gyro": "gyro_z_rad_s",
 }
+_ONE_AXIS = 0.2  # of the rate about the axis of a pendulum: what it may turn about others, as a loose hinge
 
 
 def _run(options: Mapping[str, Any], as_json: bool) -> None:
@@ -124,13 +125,17 @@ def start(
     read = [_looked_at(path, answers, rate_hz, max_memory, column_map if path == paths[0] else None) for path in paths]
     recording, maps, reasons = _one_recording(paths, read, array)
     kind = rig or answers.choice("What moved?", RIGS, _likely_rig(recording), "--rig")
-    source = next((one for one in _DRIVES[kind] if _COLUMNS[one] in recording.reference), "")
+    source, swings = _source(recording, kind), recording
+    if kind == "pendulum" and "gyro_z_rad_s" in recording.reference and not source:
+        recording, swings, line = _swung(recording, paths[0])
+        reasons.append(line)
+        source = "tacho"
     if not source and kind != "body":
         raise InputError(
             f"{paths[0]}: no reference of the rig {kind!r} ({', '.join(_COLUMNS[one] for one in _DRIVES[kind])}); "
             "give the file that holds it too, or name its column in a map"
         )
-    drawing, found = _drawn(recording, kind, source, array, answers, part, place_m)
+    drawing, found = _drawn(swings, kind, _source(swings, kind), array, answers, part, place_m)
     folder.mkdir(exist_ok=True)
     write_text(folder / "array.toml", drawing.to_toml())
     _named(recording, drawing).carrying(drawing).write(folder / "run.parquet")
@@ -272,6 +277,54 @@ def _one_recording(
         (recording if not isinstance(recording, MappedFile) else mapped_recording(main, recording.column_map)),
         maps,
         reasons,
+    )
+
+
+def _source(recording: "Recording", kind: str) -> str:
+    """Return the best source of a rig's drive that a recording has; empty where it has none."""
+    return next((one for one in _DRIVES[kind] if _COLUMNS[one] in recording.reference), "")
+
+
+def _swung(recording: "Recording", path: Path) -> "tuple[Recording, Recording, str]":
+    """Return a pendulum's recording with its gyro as the tachometer, another with the angle, and what was done.
+
+    The axis is the direction in which the gyro changes most. A pendulum comes back to where it hangs, so the trend of
+    the turned angle is the bias of the gyro, and the angle without trend is that from where it hangs. Too rough to be a
+    reference, the angle shows how the chips are mounted.
+
+    Raises
+    ------
+    InputError
+        If it turns about more than one axis.
+    """
+    from dataclasses import replace
+
+    from scipy.integrate import cumulative_trapezoid
+
+    from gfimu.recording.timing.reference_times import reference_on_rows
+
+    known = reference_on_rows(recording).reference
+    gyro = np.column_stack([known[f"gyro_{axis}_rad_s"] for axis in "xyz"])
+    seen = np.isfinite(gyro).all(axis=1)
+    if seen.sum() < 3:
+        raise InputError(f"{path}: the gyro has fewer than three values; give the file that holds them too")
+    _, spread, directions = np.linalg.svd(gyro[seen] - gyro[seen].mean(axis=0), full_matrices=False)
+    if spread[1] > _ONE_AXIS * spread[0]:
+        raise InputError(
+            f"{path}: the gyro turns about more than one axis, {100 * spread[1] / spread[0]:.0f} % of its rate about a "
+            "second one; fix the axis of the pendulum, or go on with --rig body"
+        )
+    t, rate = recording.t_s, gyro @ directions[0]
+    turned = cumulative_trapezoid(rate[seen], t[seen], initial=0.0)
+    trend = np.polyfit(t[seen], turned, 1)
+    tacho, angle = rate - trend[0], np.full(len(t), np.nan)
+    angle[seen] = turned - np.polyval(trend, t[seen])
+    axis = " ".join(f"{part:.3g}" for part in directions[0])
+    line = f"no encoder: the rate is that of the gyro about ({axis}), less its bias of {trend[0]:.3g} rad/s"
+    return (
+        replace(recording, reference={**known, "tacho_rad_s": tacho}),
+        replace(recording, reference={**known, "angle_rad": angle}),
+        line,
     )
 
 
