@@ -297,8 +297,7 @@ def _swung(recording: "Recording", path: Path) -> "tuple[Recording, Recording, s
     InputError
         If it turns about more than one axis.
     """
-    from dataclasses import replace
-
+    import numpy as np
     from scipy.integrate import cumulative_trapezoid
 
     from gfimu.recording.timing.reference_times import reference_on_rows

@@ -65,6 +65,24 @@ def axis(folder, rate=400.0):
     return rows(folder / "tool.csv", "time_s,ax_g,ay_g,az_g,carriage_mm", [t, *read.T, 1000.0 * place])
 
 
+def phone(folder, arm=0.6, second=0.0):
+    """A phone on an arm: accelerations with gravity, a gyro with a bias, stamps of its system; no encoder."""
+    rng = np.random.default_rng(3)
+    t = np.sort(np.arange(0.0, 40.0, 0.01) + 0.001 * rng.standard_normal(4000))
+    even = np.linspace(t[0], t[-1], 200_000)
+    begun = np.clip((even - 4.0) / 2.0, 0.0, 1.0)
+    angle = 0.6 * begun**3 * (10.0 - 15.0 * begun + 6.0 * begun**2) * np.exp(-even / 80.0) * np.cos(3.9 * even)
+    speed = np.gradient(angle, even)
+    turning = np.gradient(speed, even)
+    angle, speed, turning = (np.interp(t, even, one) for one in (angle, speed, turning))
+    force = np.column_stack([G * np.sin(angle) + arm * turning, G * np.cos(angle) + arm * speed**2, 0.0 * t])
+    read = force @ MOUNTED.T + [0.05, -0.08, 0.1] + 0.02 * rng.standard_normal((len(t), 3))
+    turned = np.column_stack([0.0 * t, second * np.sin(7.0 * t), speed]) @ MOUNTED.T
+    turned = turned + [0.01, -0.005, 0.008] + 0.002 * rng.standard_normal((len(t), 3))
+    head = "time_s,acc_x_m_s2,acc_y_m_s2,acc_z_m_s2,gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s"
+    return rows(folder / "phone.csv", head, [t, *read.T, *turned.T])
+
+
 def array_of(folder):
     return gfimu.AccelerometerArray.load(folder / "array.toml")
 
@@ -82,6 +100,33 @@ def test_a_pendulum_in_one_file(tmp_path, gfimu_command):
     seen = gfimu_command(*check.split()[1:], "--json")
     assert seen.code == 0, seen.stderr
     assert "gfimu diagnose" in diagnose
+
+
+def test_a_phone_on_a_pendulum_takes_its_rate_from_the_gyro(tmp_path):
+    made = gfimu.start(phone(tmp_path), rig="pendulum", part="generic", out=tmp_path / "made")
+    [chip] = array_of(tmp_path / "made").chips
+    assert chip.position == pytest.approx([0.0, -0.6, 0.0], abs=0.01)
+    assert np.abs(chip.axes) == pytest.approx(MOUNTED, abs=1e-6)
+    assert any("no encoder: the rate is that of the gyro" in line for line in made.reasons)
+    run, twin = gfimu.Recording.read(tmp_path / "made" / "run.parquet"), Twin.load(tmp_path / "made" / "twin.toml")
+    assert twin.drive_source == "tacho"
+    assert np.nanmean(run.reference["tacho_rad_s"]) == pytest.approx(0.0, abs=0.01)  # without the bias of the gyro
+    [mounted] = chip_axes(run, twin)
+    assert mounted.rms < 0.2
+
+
+def test_a_phone_that_turns_about_two_axes_is_no_pendulum(tmp_path):
+    with pytest.raises(InputError, match=r"more than one axis.*--rig body"):
+        gfimu.start(phone(tmp_path, second=1.0), rig="pendulum", part="generic", out=tmp_path / "made")
+
+
+@pytest.mark.study
+def test_a_phone_on_a_pendulum_has_the_biases_that_it_has(tmp_path):
+    gfimu.start(phone(tmp_path), rig="pendulum", part="generic", out=tmp_path / "made")
+    verdict = gfimu.diagnose(tmp_path / "made" / "run.parquet", tmp_path / "made" / "twin.toml")
+    [bias] = [cause for cause in verdict.causes if cause.effect == "bias"]
+    for key, value in {"a11_m_s2": 0.05, "a12_m_s2": -0.08, "a13_m_s2": 0.1}.items():
+        assert bias.parameters[key] == pytest.approx(value, abs=max(4.0 * bias.std[key], 0.01))
 
 
 def test_a_table_with_a_tachometer_of_another_clock(tmp_path):

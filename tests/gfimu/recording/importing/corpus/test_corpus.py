@@ -38,9 +38,7 @@ def test_a_shape_is_read_right(name, tmp_path):
     "names",
     [
         pytest.param(frozenset(SHAPES) - BLIND, id="known"),
-        pytest.param(
-            BLIND, id="blind", marks=pytest.mark.xfail(strict=True, reason="3 of 68 are silent")
-        ),
+        pytest.param(BLIND, id="blind", marks=pytest.mark.xfail(strict=True, reason="3 of 68 are silent")),
     ],
 )
 def test_nine_of_ten_are_right_and_hardly_one_wrong_in_silence(names):
