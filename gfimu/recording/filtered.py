@@ -1,8 +1,8 @@
 """Recordings with rows left out on request (``drop`` of a column map), each kind counted and reported.
 
 ``corrupt``: a channel has a value that can be no measurement, as 1e19. ``out_of_range``: a channel reads more than its
-part can. ``missing``: a channel has no value, as in a burst of NaN. ``wrong_read``: a chip has a
-reading that is zero or a multiple of those around it, as where a register is misread. ``duplicates``: the time of
+part can. ``missing``: a channel has no value, as in a burst of NaN. ``wrong_read``: a chip or a tachometer has a value
+that is zero or a multiple of those around it, as of a misread register or a lost pulse. ``duplicates``: the time of
 another row. ``unordered``: a time that goes back, or a wild one. Without the request such values of `corrupt` rows
 alone are left out, `missing` ones stay missing, and a recording of gfimu's whose times do not increase is refused.
 """
@@ -22,7 +22,7 @@ from gfimu.array.array import AccelerometerArray
 from gfimu.array.parts.plausible import rails_of_array
 from gfimu.base.errors import InputError, warn
 from gfimu.base.files.metadata import schema_metadata
-from gfimu.recording.doubts.samples import chips_of, wrong_reads
+from gfimu.recording.doubts.judge import doubts_of
 from gfimu.recording.importing.clock import increasing_times
 from gfimu.recording.importing.column_map import ColumnMap, TimeSpec
 from gfimu.recording.importing.recognise import map_hint
@@ -210,12 +210,11 @@ def _chosen_rows(
 
 
 def _misread(recording: Recording) -> NDArray[np.bool_]:
-    """Mark the rows (n,) in which a register of a chip was misread."""
+    """Mark the rows (n,) in which a register of a chip, or a reference rate, was misread."""
     found = np.zeros(len(recording), dtype=bool)
-    columns = dict(zip(recording.channels, recording.readings.T, strict=True))
-    for chip in chips_of(recording.channels):
-        for one in wrong_reads({name: columns[name] for name in chip}):
-            found[one.rows] |= one.is_no_reading
+    for one in doubts_of(recording):
+        if one.kind == "wrong_read":
+            found[one.rows] = True
     return found
 
 

@@ -120,7 +120,6 @@ def test_a_phone_that_turns_about_two_axes_is_no_pendulum(tmp_path):
         gfimu.start(phone(tmp_path, second=1.0), rig="pendulum", part="generic", out=tmp_path / "made")
 
 
-@pytest.mark.study
 def test_a_phone_on_a_pendulum_has_the_biases_that_it_has(tmp_path):
     gfimu.start(phone(tmp_path), rig="pendulum", part="generic", out=tmp_path / "made")
     verdict = gfimu.diagnose(tmp_path / "made" / "run.parquet", tmp_path / "made" / "twin.toml")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import stat
 from pathlib import Path
 
@@ -13,6 +14,11 @@ __all__ = ["LARGEST_TEXT", "as_path", "check_input", "first_bytes", "is_ordinary
 
 LARGEST_TEXT = 20_000_000
 """Numerical: bytes of a TOML file, or of a calibration as JSON; in memory they may take 25 times as much."""
+
+
+_POINTER = re.compile(rb"version https://git-lfs.{0,400}?\nsize (\d+)", re.DOTALL)
+_LONGEST_POINTER = 1024
+"""Numerical: bytes; that of Git LFS has to be shorter."""
 
 
 def as_path(path: str | os.PathLike[str]) -> Path:
@@ -26,7 +32,8 @@ def check_input(path: str | Path, *, largest: float = math.inf) -> Path:
     Raises
     ------
     InputError
-        If it is missing, a folder, a device or a pipe, has more bytes than ``largest``, or its name can't be one.
+        If it is missing, a folder, a device or a pipe, has more bytes than ``largest``, its name can't be one, or it is
+        a Git LFS pointer to a file that was not fetched.
     """
     file = as_path(path)
     try:
@@ -43,6 +50,12 @@ def check_input(path: str | Path, *, largest: float = math.inf) -> Path:
         raise InputError(f"{_short(file)}: is no ordinary file; write its content to one first")
     if stated.st_size > largest:
         raise InputError(f"{_short(file)}: has more than {largest / 1e6:g} MB, as no such file has; give another")
+    if stated.st_size < _LONGEST_POINTER:
+        with system_errors(file):
+            pointer = _POINTER.match(file.read_bytes())
+        if pointer:
+            size = pointer[1].decode()
+            raise InputError(f"{_short(file)}: a Git LFS pointer of a file of {size} bytes; fetch it with git lfs pull")
     return file
 
 

@@ -235,7 +235,7 @@ def wrong_reads(
     if wrong.any():
         text = (
             f"{', '.join(names)}: {int(wrong.sum())} single readings are zero or a multiple of those around them "
-            f"({rows_in_words(rows[wrong])}), as where a register is misread; results do without them "
+            f"({rows_in_words(rows[wrong])}), as of a misread register or a lost pulse; results do without them "
             "(gfimu convert --drop wrong_read)"
         )
         found.append(Doubt("wrong_read", text, False, names, rows[wrong], is_no_reading=True))

@@ -308,9 +308,9 @@ class Fit:
         return replace(other, free=self.free, at=np.r_[shift, self.at[_RATE:]])
 
     def with_larger_walks(self) -> list[Fit]:
-        """Return the fits of a random walk as large as the noise of the rates makes it, and larger while that helps.
+        """Return fits with a random walk of the size that the noise of the rates makes, and larger while likelier.
 
-        Rates between the samples of a tachometer are unknown too, and more so than its noise.
+        The rate between two samples of a tachometer is unknown, which adds to the walk of its angle.
         """
         found = [self.solved()]
         while len(self.at) > _OTHERS and len(found) < _SIZES:
@@ -323,9 +323,9 @@ class Fit:
         return found
 
     def surprise(self) -> float:
-        """Return the negative log evidence, nats: of the data whatever the free parameters are, and of the tachometer.
+        """Return the negative log evidence of the fit's model with the prior odds of its kind of tachometer, nats.
 
-        It is that of a Gaussian about the least misfit (Laplace's approximation).
+        The likelihood is integrated over the free parameters as a Gaussian about the least misfit (Laplace).
         """
         prior = self.prior[list(self.free)]
         precision = self.curvature()[1].sum(axis=0) + np.diag(prior)
@@ -454,12 +454,12 @@ def mixed(fits: list[Fit]) -> tuple[Fit, ClockEstimate]:
     surprise = np.array([one.surprise() for one in fits])
     weight = np.exp(surprise.min() - surprise)
     best = fits[int(np.argmax(weight))]
-    likely = [(one, share) for one, share in zip(fits, weight / weight.sum(), strict=True) if share > _UNLIKELY]
-    variance = sum(
-        share * (np.square(one.estimate().std) + (one.at - best.at)[[_SHIFT, _RATE]] ** 2) for one, share in likely
-    )
-    std = np.sqrt(variance)
-    return best, replace(best.estimate(), std=(float(std[0]), float(std[1])))
+    found, variance = best.estimate(), np.zeros(2)
+    for one, share in zip(fits, weight / weight.sum(), strict=True):
+        if share > _UNLIKELY:
+            std = np.array((found if one is best else one.estimate()).std)
+            variance += share * (std**2 + (one.at - best.at)[[_SHIFT, _RATE]] ** 2)
+    return best, replace(found, std=(float(variance[0] ** 0.5), float(variance[1] ** 0.5)))
 
 
 def _scattered(pull: NDArray[np.float64], bend: NDArray[np.float64], prior: NDArray[np.float64]) -> NDArray[np.float64]:

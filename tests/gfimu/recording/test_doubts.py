@@ -61,6 +61,33 @@ def test_misread_registers_are_found_with_their_rows_and_left_out(made, factor):
     assert_array_equal(np.isnan(cleaned.readings), np.isnan(changed(run, rows, [0, 1, 2], np.nan).readings))
 
 
+def with_tacho(rate):
+    run = at_rest()
+    return replace(run, reference={"tacho_rad_s": rate})
+
+
+def test_lost_pulses_and_impossible_values_of_a_tachometer_are_left_out(tmp_path):
+    t = at_rest().t_s
+    rate = 5.0 + 3.0 * np.sin(0.7 * t) + 0.02 * np.random.default_rng(2).standard_normal(len(t))
+    wrong = rate.copy()
+    wrong[[300, 500, 900]] *= [2.0, 0.5, 0.0]
+    wrong[700] = 1e30
+    found = {one.kind: one for one in doubts_of(with_tacho(wrong))}
+    assert found["wrong_read"].rows.tolist() == [300, 500, 900]
+    assert found["corrupt"].rows.tolist() == [700]
+    kept = without_doubtful(with_tacho(wrong), None, found.values()).reference["tacho_rad_s"]
+    assert np.flatnonzero(np.isnan(kept)).tolist() == [300, 500, 700, 900]
+    with_tacho(np.where(wrong > 1e3, rate, wrong)).write(tmp_path / "run.parquet")
+    assert gfimu.convert(tmp_path / "run.parquet", drop="wrong_read").dropped == {"wrong_read": 3}
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_rate_in_steps_that_stops_and_starts_is_not_doubtful(seed):
+    rng, t = np.random.default_rng(seed), at_rest().t_s
+    rate = np.round(np.cumsum(rng.standard_normal(len(t))) * 0.05, seed % 3 + 1) * (np.sin(0.5 * t) > 0.0)
+    assert "tacho_rad_s" not in {name for one in doubts_of(with_tacho(rate)) for name in one.channels}
+
+
 def test_a_knock_is_a_note_and_stays():
     run = at_rest()
     knocked = changed(run, [500], [0, 1, 2, 3, 4, 5], run.readings[500] + np.array([7.0, -3.0, 4.0] * 2))

@@ -235,7 +235,11 @@ def _chosen(triads: list[Triad], *, named: bool) -> list[Triad]:
             found.append(replace(one, kind=""))
         elif one in showing and usual and not one.is_usual and not one.by_name:
             found.append(replace(one, kind=""))  # of constant length without being gravity: a magnetic field
-        elif one in showing and not named and one.unit != best.unit and one.off > _POLICY.exact_counts:
+        elif (
+            (one in showing and not named)
+            and (one.unit != best.unit and one.unit[1] == 1.0)  # counts have the gain and bias of a raw chip
+            and one.off > _POLICY.exact_counts
+        ):
             found.append(replace(one, kind=""))  # beside a chip that shows gravity in another unit
         elif one.kind == "acceleration" and not one.shows_gravity and not one.by_name:
             found.append(replace(one, kind="rate"))

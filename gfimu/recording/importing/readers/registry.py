@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -78,7 +77,6 @@ _NOT_READ: Mapping[str, tuple[bytes, ...]] = {
         b"\x80\x05",
     ),
 }
-_POINTER = re.compile(rb"version https://git-lfs.{0,400}?\nsize (\d+)", re.DOTALL)
 _PACKABLE = ("text", "json")  # formats that are read packed by gzip, bzip2 or xz
 
 
@@ -102,9 +100,6 @@ def format_of(path: Path) -> str:
     packed = first_bytes(path, 4096)
     if not packed:
         raise InputError(f"{path}: empty file; record again or give another file")
-    if pointer := _POINTER.match(packed):
-        size = pointer[1].decode()
-        raise InputError(f"{path}: a Git LFS pointer of a file of {size} bytes; fetch it with git lfs pull")
     head = first_unpacked(packed)
     plain = head.removeprefix(b"\xef\xbb\xbf").lstrip() if head.lstrip()[:1] in {b"{", b"["} else head
     known = readers()

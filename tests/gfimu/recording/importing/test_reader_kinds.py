@@ -128,6 +128,14 @@ def test_what_is_not_read_is_named_with_the_remedy(tmp_path, words):
     assert "\n" not in str(error.value)
 
 
+def test_every_reader_names_a_git_lfs_pointer(tmp_path):
+    words = "a Git LFS pointer of a file of 1360251 bytes"
+    (tmp_path / "run.csv").write_bytes(REFUSED[f"{words}; fetch it with git lfs pull"])
+    for read in (gfimu.Recording.read, gfimu.convert, gfimu.AccelerometerArray.load):
+        with pytest.raises(InputError, match=words):
+            read(tmp_path / "run.csv")
+
+
 def test_an_opendocument_spreadsheet_is_named(tmp_path):
     import zipfile
 

@@ -64,6 +64,14 @@ def test_a_foreign_reference_is_refused(seed):
     assert join_reference(channels, reference, force=True).doubts
 
 
+def test_a_slow_rate_in_coarse_counts_is_smoothed_through_its_stairs():
+    t = np.arange(0.0, 60.0, 0.03)
+    rate = 12.0 * np.exp(-t / 40.0)
+    counted = np.round(rate, 1)
+    basis = ReferenceSeries("tacho.csv", t, {"tacho_rad_s": counted}).basis()
+    assert np.std(basis.angle(t, 1) - rate) < 0.3 * np.std(counted - rate)
+
+
 def test_a_constant_rate_has_no_times():
     channels, reference, _ = two_files(1)
     still = ReferenceSeries("tacho.csv", reference.t_s, {"tacho_rad_s": np.full(len(reference.t_s), 3.0)})
